@@ -19,8 +19,8 @@ SMALL = BuildOptions(
     modes=30,
     more_modes=0,
     strains=24,
-    training=TrainingOptions(paths=36, steps=12, bend=0.3),
-    test=TrainingOptions(paths=2, steps=8, bend=0.3, seed=1000),
+    training=TrainingOptions(paths=36, steps=6, bend=0.3),
+    test=TrainingOptions(paths=2, steps=4, bend=0.3, seed=1000),
 )
 
 

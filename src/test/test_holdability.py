@@ -11,7 +11,19 @@ import pytest
 import yaml
 
 from gravcomp.commands.__main__ import main
-from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
+from gravcomp.description import (
+    Cable,
+    Elements,
+    Limits,
+    Lumen,
+    Material,
+    Payload,
+    RestShape,
+    Robot,
+    Section,
+    Segment,
+    load_robot_file,
+)
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.holdability import Binding, HoldOptions, background, holdability, path
 from gravcomp.holdability.as_json import as_json
@@ -20,8 +32,10 @@ from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.motor_tension import weak_motors
 from gravcomp.holdability.play import play_of
 from gravcomp.holdability.search import HoldSearch
+from gravcomp.holdability.symmetry import symmetries, turns
 from gravcomp.holdability.text import lines, sentence
 from gravcomp.inverse import InverseController, straight_target
+from gravcomp.inverse.rest_target import rest_target
 from gravcomp.simulation import Simulator
 
 _GRAVITY = 9.80665
@@ -147,6 +161,43 @@ def test_the_answer_does_not_depend_on_the_order(search):
     before = search.answer(first)
     search.answer(second)
     assert all(np.array_equal(a, b) for a, b in zip(dataclasses.astuple(search.answer(first)), dataclasses.astuple(before)))
+
+
+def test_an_answer_holds_for_all_directions_that_turns_and_mirrors_of_the_robot_give(search, monkeypatch):
+    found = symmetries(search.robot, search.target)
+    assert len(found) == 6 and turns(found) == 3
+    one, asked = search.answer(_SIDE[0]), []
+    for symmetry in found[1:3]:  # the other two cables
+        image, own = symmetry.of(one), search.answer(symmetry.of(one).direction)
+        assert image.held == own.held and image.demand == pytest.approx(own.demand, rel=0.01)
+    monkeypatch.setattr(HoldSearch, "answer", lambda self, direction: asked.append(direction) or dataclasses.replace(
+        one, direction=direction, cable="c0"))  # fmt: skip
+    answers = holdability(search.model, with_needed=False).directions
+    assert len(answers) == 1 + len(sphere(12, 3)) == 45 and len(asked) <= 14
+    for answer in answers:
+        assert any(np.abs(symmetry.of(answer).direction - direction).max() < 1e-9 for symmetry in found for direction in asked)
+    assert {answer.cable for answer in answers} == {"c0", "c1", "c2"}
+
+
+@pytest.mark.parametrize(
+    ("change", "number"),
+    [
+        ({"payload": Payload(5e-3, (0.0, 1e-3, 0.0))}, 1),
+        ({"segments": (Segment("s", length=_LENGTH, outer_diameter=_DIAMETER, lumens=(Lumen(2e-3, x=2e-3),)),)}, 1),
+        ({"segments": (Segment("s", length=_LENGTH, section=Section("rectangle", 10e-3, 10e-3)),)}, 1),
+        ({"segments": (Segment("s", length=_LENGTH, outer_diameter=_DIAMETER, rest=RestShape(0.5, 0.0)),)}, 1),
+        ({"cables": arm().cables[:2]}, 2),  # their mirror
+        ({"cables": (*arm().cables[:2], dataclasses.replace(arm().cables[2], friction=0.1))}, 2),
+        ({"cables": (*arm().cables[:2], dataclasses.replace(arm().cables[2], angle=4.0))}, 1),
+    ],
+)
+def test_a_robot_that_is_not_the_same_from_every_side_has_fewer_symmetries(change, number):
+    robot = dataclasses.replace(arm(), **change)
+    assert len(symmetries(robot, rest_target(robot))) == number
+
+
+def test_a_target_off_the_axis_has_no_symmetries():
+    assert len(symmetries(arm(), rest_target(arm(), 0.3, 0.0))) == 1
 
 
 def test_the_sphere_has_its_poles_and_its_equator():

@@ -25,7 +25,7 @@ from gravcomp.reduction.strain_polynomials import strain_at, strain_polynomials,
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 from gravcomp.training import BuildOptions, TrainingOptions, build
 from gravcomp.training.build import trained
-from gravcomp.training.samples import Sample, _released, samples
+from gravcomp.training.samples import Sample, _start, samples
 
 
 @pytest.fixture(scope="module")
@@ -205,15 +205,20 @@ def test_the_training_takes_commands_back_where_a_soft_robot_loses_its_equilibri
     assert len(found) >= 10  # 2 when the loss of the equilibrium is not said to the controller
 
 
-def test_a_path_begins_with_the_equilibrium_of_the_released_robot_at_less_cost_than_a_search(soft, monkeypatch):
+def test_a_path_begins_with_the_hanging_robot_where_one_search_finds_no_equilibrium(soft, monkeypatch):
     gravity = 2.0 * 9.81 * np.array([0.17, 0.0, -0.98])  # nearly upright: the tip sinks to the side
+    hanging = [0.0, 0.0, np.linalg.norm(gravity)]
     factors, factor = [], BlockMatrix.factor
     monkeypatch.setattr(BlockMatrix, "factor", lambda matrix: factors.append(None) or factor(matrix))
     begun, searched = StaticSolver(soft), StaticSolver(soft)
-    assert _released(begun, gravity)
+    assert _start(begun, gravity) == pytest.approx(hanging) and begun.state.converged
     few = len(factors)
-    assert searched.solve(gravity, CableInput()).converged and len(factors) - few > few
-    assert begun.state.u == pytest.approx(searched.state.u, abs=1e-5 * soft.length)
+    assert searched.solve(gravity, CableInput()).converged and len(factors) - few > 3 * few
+    monkeypatch.setattr(sys.modules["gravcomp.training.samples"], "_direction", lambda rng: gravity / np.linalg.norm(gravity))
+    found = samples(soft, TrainingOptions(paths=1, steps=8, seed=3))
+    turned = np.degrees([np.arccos(sample.gravity @ gravity / np.linalg.norm(sample.gravity) / hanging[2]) for sample in found])
+    assert len(found) >= 6 and turned[0] == pytest.approx(170.0, abs=1.0)
+    assert (np.diff(turned) < 0.0).all() and (np.diff(turned) > -30.1).all()  # on its way, in steps
 
 
 @pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 4)])
@@ -227,6 +232,29 @@ def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_
     monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args: found)
     options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
     assert trained(model, options).basis.shape[1] == size
+
+
+@pytest.mark.parametrize(
+    ("earlier", "new", "ends"),
+    [(range(6), range(6), True), (range(3), range(3, 6), False), (range(6), range(12), True)],
+    ids=["the same shapes", "others, which the modes have room for", "more than the modes have room for"],
+)
+def test_the_training_ends_where_more_paths_would_not_help(robot, monkeypatch, earlier, new, ends):
+    model = RobotModel(robot.with_material(law="svk"))
+    rng, none, asked = np.random.default_rng(0), np.zeros(model.tendons.count), []
+    kinds = 1e-4 * model.length * rng.normal(size=(12, 3 * model.n_free))
+
+    def found(of: range) -> list[Sample]:
+        shapes = rng.normal(size=(14, len(of))) @ kinds[list(of)]
+        return [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
+
+    def asking(*args):
+        asked.append(args[-1](found(earlier), found(new)))
+        return found(new)
+
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", asking)
+    trained(model, BuildOptions(modes=4, more_modes=3, strains=2, represented=1e-6, integrated=2))
+    assert asked == [ends]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,19 @@ import dataclasses
 import numpy as np
 import pytest
 
-from gravcomp.description import Cable, Elements, Lumen, MeshBody, RestShape, Robot, Section, Segment, load_robot_file
+from gravcomp.description import (
+    Cable,
+    Elements,
+    Lumen,
+    Material,
+    MeshBody,
+    RestShape,
+    Robot,
+    Section,
+    Segment,
+    Station,
+    load_robot_file,
+)
 from gravcomp.full_model import size_choice
 from gravcomp.full_model.chosen_elements import is_chosen, with_chosen_elements
 from gravcomp.full_model.mesh_error import error_of_mesh
@@ -16,6 +28,7 @@ from gravcomp.mesh import MeshError, body_mesh, tube_mesh
 from gravcomp.mesh.division import divided_mesh, why_not_swept
 from gravcomp.mesh.measured_outline import MeasuredOutline
 from gravcomp.mesh.quality import mesh_quality
+from gravcomp.mesh.swept_sections import swept_sections
 from gravcomp.mesh_files.repair_volume import boundary_triangles
 
 trimesh = pytest.importorskip("trimesh")
@@ -106,6 +119,63 @@ def test_why_a_body_cannot_be_swept_is_said(tmp_path):
     thick, thin = Segment("a", LENGTH / 2, 9e-3, 3e-3), Segment("b", LENGTH / 2, 6e-3, 3e-3)
     stepped = Robot("body", body=MeshBody(stl(tmp_path, thick, thin, around=8, radial=1)))
     assert why_not_swept(stepped).startswith("its section changes in a step at 4")
+
+
+BASE, TIP = 10e-3, 4e-3  # radii of a finger
+TURN = np.linspace(0.0, np.pi / 2, 24)
+DOME = np.column_stack([TIP * np.cos(TURN), LENGTH - TIP + TIP * np.sin(TURN)])
+
+
+def of_revolution(folder, profile, around: int = 48) -> str:
+    """The surface of a profile of radii and heights (n, 2) in m in a file, in mm: as stiff and heavy as with circles."""
+    side = 2.0 * np.pi / around
+    larger = ((np.sin(side) / side) * (2.0 + np.cos(side)) / 3.0) ** -0.25
+    path = folder / "body.stl"
+    trimesh.creation.revolve(1e3 * np.array(profile) * [larger, 1.0], sections=around).export(path)
+    return str(path)
+
+
+def test_a_rounded_tip_is_swept_with_its_mass_and_its_tip(tmp_path):
+    profile, soft = [[0.0, 0.0], [BASE, 0.0], *DOME[:-1], [0.0, LENGTH]], Material(youngs_modulus=0.1e6)
+    surface = Robot("finger", body=MeshBody(of_revolution(tmp_path, profile), material=soft))
+    assert why_not_swept(surface) is None
+    elements = Elements(around=8, along=16, radial=1, grading=1.0, equal_stiffness=True)
+    model = MeshedModel(surface, divided_mesh(surface, elements))
+    assert mesh_quality(model.mesh).jacobian_ratio > 0.2
+    tip = model.mesh.nodes[model.mesh.tip]
+    assert np.allclose(tip[:, 2], LENGTH) and 0.1 * TIP < np.ptp(tip[:, 0]) / 2 < 0.4 * TIP
+    cone, dome = np.pi / 3 * (LENGTH - TIP) * (BASE**2 + BASE * TIP + TIP**2), 2.0 / 3.0 * np.pi * TIP**3
+    assert model.mass == pytest.approx(soft.density * (cone + dome), rel=1e-3)
+    # The same finger described: its dome by stations.
+    radii = TIP * np.array([1.0, 0.95, 0.85, 0.7, 0.54, 0.41, 0.31, 0.23])
+    heights = LENGTH - TIP + np.sqrt(TIP**2 - radii**2)
+    stations = (Station(0.0, 2 * BASE), *(Station(float(z), float(2 * r)) for z, r in zip(heights, radii)))
+    described = Robot("finger", segments=(Segment("a", LENGTH, stations=stations, material=soft),))
+    there = MeshedModel(described, divided_mesh(described, dataclasses.replace(elements, along=18)))
+    loads = mesh_loads(there)
+    here, other = (shapes_under(one, loads).tips[0] for one in (model, there))
+    assert abs(here[0]) > 0.1 * LENGTH
+    assert np.linalg.norm(here - other) < 5e-4 * LENGTH
+
+
+@pytest.mark.parametrize(
+    ("profile", "layers"),
+    [
+        ([[0, 0], [5e-3, 0], [5e-3, LENGTH], [0, LENGTH]], 0),
+        ([[0, 0], [9e-3, 0], [5e-3, LENGTH], [0, LENGTH]], 0),
+        ([[0, 0], [BASE, 0], *DOME[:-1], [0, LENGTH]], 5),
+        ([[2e-3, 0], [BASE, 0], *DOME[: -sum(DOME[:, 0] <= 2e-3)], [2e-3, LENGTH - 0.5e-3], [2e-3, 0]], 5),
+    ],
+    ids=["rod", "cone", "rounded", "rounded with a lumen"],
+)
+def test_a_tip_is_rounded_where_it_shrinks_more_than_a_taper(tmp_path, profile, layers):
+    body = MeshBody(of_revolution(tmp_path, profile))
+    sections = swept_sections(body)
+    assert len(sections.marks) == layers and sections.marks == tuple(sorted(sections.marks))
+    if layers:
+        assert sections.marks[0] > sections.length - 2.0 * TIP
+        areas = [sections.curves(s)[-1].half_width for s in (*sections.marks, sections.length)]
+        assert (np.diff(areas) < 0.0).all()
 
 
 def test_tetrahedra_get_smaller_until_their_estimated_error_is_small_enough(tmp_path, monkeypatch):

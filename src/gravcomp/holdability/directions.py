@@ -3,15 +3,18 @@
 import numpy as np
 
 
-def sphere(equator: int) -> np.ndarray:
+def sphere(equator: int, turns: int = 1) -> np.ndarray:
     """Return unit vectors (k, 3) of directions in `soft_base`: rings at equal inclinations, `equator` of them on the equator.
 
-    A ring at the inclination t to the z axis has about `equator` sin t directions, the first toward x; each pole is one.
+    A ring at the inclination t to the z axis has about `equator` sin t directions, the first toward x; each pole is one. turns:
+    number of turns about z that map the robot onto itself, of which the number in a ring is a multiple, if that is not many more.
     """
+    step = turns if turns <= equator // 2 else 1
     found = []
     for ring in range(equator // 2 + 1):
         inclination = np.pi * ring / (equator // 2)
-        count = max(1, round(equator * np.sin(inclination)))
+        wanted = equator * np.sin(inclination)
+        count = 1 if ring in (0, equator // 2) else step * max(1, round(wanted / step))
         for azimuth in 2.0 * np.pi * np.arange(count) / count:
             found.append(direction(inclination, azimuth))
     return np.array(found)

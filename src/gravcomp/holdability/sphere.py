@@ -13,6 +13,7 @@ from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.needed import needed
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.search import HoldSearch
+from gravcomp.holdability.symmetry import known_answer, turns
 from gravcomp.inverse.target import Target
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
@@ -46,13 +47,18 @@ def holdability(
     asked = _directions(search) if directions is None else np.asarray(directions, float)
     asked = asked / np.linalg.norm(asked, axis=1, keepdims=True)
     answers: list[DirectionAnswer | None] = [None] * len(asked)
+    computed: list[DirectionAnswer] = []
     # The worst first: it is the answer that the user waits for.
     demands = np.array([search.linear_demand(direction) for direction in asked])
     order = np.argsort(-demands, kind="stable")
     if first and target is None:
         first(_estimate(search, asked[order[0]]))
     for count, index in enumerate(order):
-        answer = answers[index] = search.answer(asked[index])
+        answer = known_answer(search.symmetries, computed, asked[index])
+        if answer is None:
+            answer = search.answer(asked[index])
+            computed.append(answer)
+        answers[index] = answer
         if progress:
             progress(count + 1, len(asked), answer)
     return _summary(search, tuple(answer for answer in answers if answer), with_needed)
@@ -60,10 +66,10 @@ def holdability(
 
 def _directions(search: HoldSearch) -> np.ndarray:
     """Return the sphere's directions (k, 3), the first of them the worst of the linear estimate on a finer sphere."""
-    equator = search.options.equator
-    fine = sphere(_FINER * equator)
+    equator, number = search.options.equator, turns(search.symmetries)
+    fine = sphere(_FINER * equator, number)
     worst = fine[int(np.argmax([search.linear_demand(direction) for direction in fine]))]
-    return np.vstack([worst, sphere(equator)])
+    return np.vstack([worst, sphere(equator, number)])
 
 
 def _estimate(search: HoldSearch, direction: np.ndarray) -> str:

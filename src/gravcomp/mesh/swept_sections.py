@@ -1,7 +1,8 @@
 """Whether the section of a body from a file can be swept along its axis, and its curves at every height.
 
 A body is swept where every section has one outline and the same one lumen or none, whose rays from their middles meet them once,
-and where the section changes gradually, also at its ends. Sharp edges along the body, up to four, get nodes of their own.
+and where the section changes gradually, also at its ends; a tip may be rounded (`rounded_tip`). Sharp edges along the body, up to
+four, get nodes of their own.
 """
 
 import dataclasses
@@ -13,8 +14,10 @@ import numpy as np
 
 from gravcomp.description import Material, MeshBody, SectionMoments
 from gravcomp.description.section_moments import boundary_moments
+from gravcomp.mesh.layered_cells import halved
 from gravcomp.mesh.measured_outline import MeasuredOutline
 from gravcomp.mesh.mesh import MeshError
+from gravcomp.mesh.rounded_tip import layers_in_rounding, stretched
 from gravcomp.mesh_files.contours import enclosed_area, section_contours
 from gravcomp.mesh_files.level_cut import level_cut
 from gravcomp.mesh_files.placing import PlacedBody
@@ -36,8 +39,8 @@ class SweptSections:
 
     placed: the body; material; corners: of every curve, from the innermost out, the polar angles (k,) in rad of its sharp edges
     at the base; slots: of every curve the polar angles (4,) there of the nodes at the corners of a square, None without edges;
-    ends: the arc lengths (m) next to base and tip up to which there are whole sections, which stand for those beyond; start and
-    marks: as those of a piece.
+    ends: the arc lengths (m) next to base and tip up to which there are whole sections, which stand for those beyond; rounding:
+    of the tip, as from `layers_in_rounding`; start: as that of a piece.
     """
 
     placed: PlacedBody
@@ -45,8 +48,8 @@ class SweptSections:
     corners: tuple[np.ndarray, ...]
     slots: tuple[np.ndarray | None, ...]
     ends: tuple[float, float]
+    rounding: tuple[float, ...] = ()
     start: float = 0.0
-    marks: tuple[float, ...] = ()
 
     @property
     def length(self) -> float:
@@ -54,12 +57,18 @@ class SweptSections:
         return self.placed.length
 
     @property
+    def marks(self) -> tuple[float, ...]:
+        """Arc lengths (m) at which layers must end: in a rounding."""
+        return self.rounding[:-1]
+
+    @property
     def in_quarters(self) -> bool:
         """Whether elements around come in multiples of 4: solid sections and those with sharp edges need that."""
         return len(self.corners) == 1 or self.slots[0] is not None
 
     def moments(self, s: float) -> SectionMoments:
-        """Return area, centroid and second moments of the section at the arc length s (m)."""
+        """Return area, centroid and second moments of the section at the arc length s (m); in a rounding, of that below it."""
+        s = min(s, self.rounding[0]) if self.rounding else s
         return boundary_moments(level_cut(self.placed.straight_surface, self._within(s)))
 
     def curves(self, s: float) -> list[MeasuredOutline]:
@@ -67,7 +76,7 @@ class SweptSections:
 
         Raises MeshError where they cannot be swept.
         """
-        found = _curves(self.placed, self._within(s))
+        found = _curves(self.placed, self._within(stretched(s, self.rounding, self.length)))
         if len(found) != len(self.corners):
             raise MeshError(
                 f"its section at {1e3 * s:.3g} mm has {len(found) - 1} lumens, not {len(self.corners) - 1} as at the base"
@@ -105,19 +114,22 @@ def _sections(placed: PlacedBody) -> SweptSections | str:
 
 def _checked(placed: PlacedBody) -> SweptSections:
     """The sections, of a default material. Raises MeshError."""
-    low, high = (_whole_section(placed, tip) for tip in (False, True))
-    heights = np.linspace(low, high, _SAMPLES)
+    low = _whole_section(placed, tip=False)
+    rounding = layers_in_rounding(lambda s: _area(placed, s), placed.length)
+    high = rounding[-1] if rounding else _whole_section(placed, tip=True)
     first = _curves(placed, low)
     corners = tuple(curve.corners for curve in first)
     if max(map(len, corners)) > 4:
         raise MeshError(f"its section has {max(map(len, corners))} sharp edges; up to 4 are swept")
-    found = SweptSections(placed, Material(), corners, _slots(first), (low, high))
+    found = SweptSections(placed, Material(), corners, _slots(first), (low, high), rounding)
     before = None
-    for height in heights:
+    for height in np.linspace(low, rounding[0] if rounding else high, _SAMPLES):
         area = found.moments(height).area
         if before is not None and not before / _STEP < area < before * _STEP:
             raise MeshError(f"its section changes in a step at {1e3 * height:.3g} mm")
         before = area
+        found.curves(height)
+    for height in halved(np.array([*found.marks, placed.length])) if rounding else ():
         found.curves(height)
     return found
 

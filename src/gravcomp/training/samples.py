@@ -7,11 +7,13 @@ tensions are those of the closed loop, including its transients. On the other pa
 external loads has one on most paths: a force and a moment in a random direction on a random section, mostly the tip's, that grow
 and fall along the path up to its `max_wrench`.
 
-A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop; a path on
-which that does not help is at its end, as a search from the straight robot takes longer than all steps of a path.
+A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop, and gravity
+turns by half as much from where there was one; a path on which that does not help is at its end, as a search from the straight
+robot takes longer than all steps of a path. For the same reason a path whose first shape one search does not find begins with the
+hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
+would sink when it stands upright is held on the way.
 """
 
-import itertools
 import json
 import zipfile
 from collections.abc import Callable, Iterator
@@ -29,14 +31,21 @@ from gravcomp.inverse import InverseController, direction_weight, rest_target
 from gravcomp.simulation.simulator import Simulator
 
 GRAVITY = 9.81
-# One step of a path: rotation of gravity, and the time in which the cables may move.
-_TURN = np.radians(5.0)
-_INTERVAL = 0.05
-_STEPS_A_TURN = 15
+# One step of a path: rotation of gravity, and the time in which the cables may move; after which rotation the axis changes.
+# Newton's method takes as many factors for a step of 10 deg as for one of 5, and every second shape of such a path trains as
+# good a model as all of them.
+_TURN = np.radians(10.0)
+_INTERVAL = 0.1
+_STRAIGHT_ON = np.radians(70.0)
+# How exact the shapes are, over the length: far below what the modes leave.
+_TOLERANCE = 1e-5
 # Steps in a row without equilibrium that end a path: the controller has taken the command back twice and paid out once.
 _LOST_STEPS = 3
-# Largest turn of gravity between two equilibria on the way to the first shape of a path.
-_TURN_TO_START = np.radians(30.0)
+# After a step with an equilibrium the next one is longer by this factor; after one without, half as long.
+_GROWING = 1.4
+# Largest turn of gravity in a step from the direction in which the robot hangs to the one that is wanted first. These steps do
+# not count: released robots would hardly leave the directions in which they hang.
+_TURN_AT_START = np.radians(30.0)
 # Fraction of paths with released cables, and of those that keep the robot straight.
 _RELEASED, _STRAIGHT = 0.15, 0.3
 # Fraction of paths with an external load, where the robot carries any; and of these, with the load at the tip.
@@ -52,7 +61,7 @@ class TrainingOptions:
 
     paths: int = 75
     least: int = 25
-    steps: int = 30
+    steps: int = 15
     modulus_range: tuple[float, float] = (0.6, 1.6)
     bend: float = np.radians(50.0)
     seed: int = 1
@@ -143,23 +152,32 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
         weight = rng.choice([0.0, direction_weight(model.length)])
         target = rest_target(model.robot, bend, rng.uniform(0.0, 2.0 * np.pi), tip_direction_weight=weight)
     simulator, controller = Simulator(model, reduced=False, searches=False), InverseController(model.robot)
-    gravity, displacement, lost = size * _direction(rng), None, 0
+    simulator.solver.tolerance = _TOLERANCE * model.length
+    wanted, displacement, lost = size * _direction(rng), None, 0
     largest = _largest_load(model, rng)
-    if not _released(simulator.solver, gravity):
+    gravity = _start(simulator.solver, wanted)
+    if gravity is None:
         return
+    reached, part, turned = gravity, 1.0, 0.0
+    axis, left, turn = *_way(gravity, wanted), _TURN_AT_START
+    steps = options.steps + int(np.ceil(left / turn))
     simulator.solver.extrapolates = True  # gravity turns evenly
-    for step in range(options.steps):
-        load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / options.steps)), 1.0)
+    for step in range(steps):
+        load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / steps)), 1.0)
         shape = simulator.step(gravity, displacement, wrench=wrench_of(load))
-        lost = 0 if shape.is_equilibrium else lost + 1
-        if not lost:
+        if shape.is_equilibrium:
+            lost, reached, part = 0, gravity, min(1.0, _GROWING * part)
+            left -= turned
             unknowns = model.free(simulator.displacements).copy()
             yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction, load)
-        elif lost == _LOST_STEPS:
-            return
-        if step % _STEPS_A_TURN == 0:
-            axis = _direction(rng)
-        gravity = _rotated(gravity, axis, _TURN)
+        else:
+            lost, part = lost + 1, 0.5 * part
+            if lost == _LOST_STEPS:
+                return
+        if left <= 0.0:
+            axis, left, turn = _direction(rng), _STRAIGHT_ON, _TURN
+        turned = min(part * turn, left)
+        gravity = _rotated(reached, axis, turned)
         if target is not None:
             displacement = controller.step(
                 shape.response,
@@ -171,26 +189,27 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
             ).displacement
 
 
-def _released(solver: StaticSolver, gravity: np.ndarray) -> bool:
-    """Bring the straight robot, its cables released, to its equilibrium under gravity (3,); return whether there is one.
+def _start(solver: StaticSolver, gravity: np.ndarray) -> np.ndarray | None:
+    """Bring the straight robot, its cables released, to an equilibrium; return the gravity (3,) that acts there, None for none.
 
-    Where one search from the straight robot fails, gravity turns from the direction in which the robot hangs and stays nearly
-    straight. That takes fewer steps than loads that grow, and leads to the branch on which a robot that stands upright has sunk.
+    It is `gravity` (3,) where one search from the straight robot finds its equilibrium, else that in which the robot hangs and
+    stays nearly straight.
     """
     released = CableInput()
     if solver.track(gravity, released).converged:
-        return True
+        return gravity
     solver.reset()
     hanging = np.array([0.0, 0.0, np.linalg.norm(gravity)])
-    if not solver.track(hanging, released, iterations=15).converged:
-        return False
-    across = np.cross(hanging, gravity)
+    return hanging if solver.track(hanging, released, iterations=15).converged else None
+
+
+def _way(begin: np.ndarray, end: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the axis (3,) and the angle in rad by which gravity turns from one direction to another."""
+    across = np.cross(begin, end)
+    angle = float(np.arctan2(np.linalg.norm(across), begin @ end))
     if not across.any():
         across = np.array([1.0, 0.0, 0.0])
-    angle = np.arctan2(np.linalg.norm(np.cross(hanging, gravity)), hanging @ gravity)
-    parts = max(1, int(np.ceil(angle / _TURN_TO_START)))
-    directions = [_rotated(hanging, across / np.linalg.norm(across), part * angle / parts) for part in range(parts + 1)]
-    return all(solver.approach(before, after, released).converged for before, after in itertools.pairwise(directions))
+    return across / np.linalg.norm(across), angle
 
 
 def wrench_of(load: np.ndarray) -> Wrench | None:

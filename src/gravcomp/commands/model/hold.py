@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     target.add_argument("--bend", nargs=2, type=float, metavar=("ANGLE", "PLANE"), help="bend to hold and its plane, deg")
     parser.add_argument(
         "--directions", type=int, default=12, metavar="N",
-        help="directions of gravity around the robot, with as many rings as fit (default: 12, that is 47 in all)",
+        help="directions of gravity around the robot, with as many rings as fit (default: 12, that is 45 to 47 in all)",
     )  # fmt: skip
     parser.add_argument("--picture", metavar="FILE", help="draw the sphere of directions: .png, .svg or .pdf")
 
