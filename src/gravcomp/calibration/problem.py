@@ -60,18 +60,26 @@ class Problem:
         row = np.zeros(len(self._unknowns))
         for i, unknown in enumerate(self._unknowns):
             row[i] = unknown.scale * {"density": body, "payload": payload}.get(unknown.kind, 0.0) / (deviation * mass)
-        self._prior = np.vstack([self._prior, row])
-        self._expected = np.append(self._expected, (mass - body - payload - rest) / (deviation * mass))
+        self.add(row[None], np.array([(mass - body - payload - rest) / (deviation * mass)]))
+
+    def add(self, rows: np.ndarray, expected: np.ndarray) -> None:
+        """Add data that no tip shows: rows (k, u) of x and what is expected of them (k,), over their deviations."""
+        self._prior, self._expected = np.vstack([self._prior, rows]), np.concatenate([self._expected, expected])
 
     def bending(self, x: np.ndarray) -> float:
         """Return the farthest that a tip would move in m by e times all moduli."""
         columns = [i for i, unknown in enumerate(self._unknowns) if unknown.kind == "modulus"]
         return float(np.linalg.norm(self._by(x)[:, :3, columns].sum(axis=2), axis=1).max())
 
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of the residuals: a direction has two."""
-        return max(1, round((self._root**2).sum()) * (5 if self._directed else 3) - len(self._unknowns))
+    def freedom(self, x: np.ndarray) -> int:
+        """Return the degrees of freedom of the residuals at x: a direction has two.
+
+        An unknown uses up the share of one that the tips tell of it, and no more where its prior does; all of them the trace of
+        the hat matrix (J. Ye, "On measuring and correcting the effects of data mining and model selection", JASA 93, 1998).
+        """
+        tips = self.jacobian(x)[: -len(self._prior)]
+        used = float(np.sum((tips.T @ tips) * self.covariance(x)))
+        return max(1, round(float((self._root**2).sum()) * (5 if self._directed else 3) - used))
 
     def predict(self, x: np.ndarray) -> StaticPrediction:
         """Return the prediction at x."""
@@ -146,7 +154,7 @@ class Problem:
         return any(float(one[:, part].sum()) > float(other[:, part].sum()) for part in parts)
 
     def information(self, x: np.ndarray) -> np.ndarray:
-        """Return what data and balance tell about x (u, u), without the prior."""
+        """Return what tips and other data tell about x (u, u), without the prior."""
         own = len(self._unknowns)
         rows = self.jacobian(x)
         return rows.T @ rows - self._prior[:own].T @ self._prior[:own]

@@ -50,6 +50,9 @@ class Priors:
     bias: float = parameter(
         0.05, unit="m/s^2", minimum=1e-4, maximum=1.0, description="bias of an accelerometer along each axis, at its temperature"
     )
+    scale: float = parameter(
+        0.003, minimum=1e-6, maximum=0.5, description="error of each scale of an accelerometer, and of local gravity, relative"
+    )
     creep: float = parameter(
         0.6, minimum=1e-6, maximum=100.0, description="error of a branch of creep, over the largest of the material's class"
     )

@@ -168,9 +168,12 @@ def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     inverse = None if args.plan else setup.controller.inverse  # by hand, one cable at a time is enough
     period, transmission = first_period(setup.robot), setup.hardware.transmission
     with output.stages("planning") as show:
-        return make_plan(
+        plan = make_plan(
             as_pulled(setup.robot, setup.hardware), period, transmission, plan_options(args), progress=show, inverse=inverse
         )
+    if plan.note:
+        output.note(plan.note)
+    return plan
 
 
 def _measured_live(args: argparse.Namespace, file: "RobotFile") -> Path | None:
