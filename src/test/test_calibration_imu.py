@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration.fit import fit_statics
-from gravcomp.calibration.force_length import length_rows
+from gravcomp.calibration.force_length import implausible_length, length_rows
 from gravcomp.calibration.measured import Measured, StillWindows
 from gravcomp.calibration.moving import moving
 from gravcomp.calibration.parameters import StaticParameters
@@ -71,6 +71,9 @@ def test_the_length_of_the_specific_force_tells_a_bias_from_a_turned_mount(robot
     found = np.linalg.lstsq(np.vstack([rows, np.eye(3)]), np.append(expected, np.zeros(3)), rcond=None)[0] * Priors().bias
     assert found[0] == pytest.approx(BIAS[0], abs=2e-3) and np.abs(found[1:]).max() < 1e-12
     assert len(length_rows(dataclasses.replace(windows, specific_force=None), bias, np.eye(3), Priors())[0]) == 0
+    wrong = dataclasses.replace(windows, specific_force=1.03 * force)  # of a chip as it comes from its maker
+    assert "calibrate-imu" in implausible_length(wrong, Priors()) and not implausible_length(windows, Priors())
+    assert len(length_rows(wrong, bias, np.eye(3), Priors())[0]) == 0
     # The fit has them: two orientations determine no bias by tips alone.
     tip = StaticPredictor(robot, windows).predict(StaticParameters(np.array([0.3e6]), np.zeros(0), np.zeros(0), bias=BIAS)).tip
     windows = dataclasses.replace(windows, tip_position=tip[:, :3], tip_direction=tip[:, 3:])

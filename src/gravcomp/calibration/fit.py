@@ -24,7 +24,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gravcomp.calibration.estimates import Estimate, estimate, fitted_together, moduli_told, name_of, partners_of, unfit, warnings
-from gravcomp.calibration.force_length import length_rows
+from gravcomp.calibration.force_length import implausible_length, length_rows
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
 from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
@@ -180,7 +180,10 @@ def fit_statics(
         rms_before=rms_before,
         rms_after=rms_after,
         evaluations=problem.evaluations,
-        warnings=tuple(warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any()))),
+        warnings=(
+            *warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any())),
+            *filter(None, [implausible_length(windows, priors)]),
+        ),
         creep_times=creep_times,
     )
 

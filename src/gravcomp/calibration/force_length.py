@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from gravcomp.calibration.estimates import IMPLAUSIBLE
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.orientation.calibration import POSE_NOISE
@@ -30,14 +31,31 @@ def scale_rows(gravity: np.ndarray, mount: np.ndarray, priors: Priors) -> np.nda
     return np.asarray(priors.scale * np.linalg.norm(gravity, axis=1)[:, None] * (_along(gravity) @ mount) ** 2)
 
 
+def implausible_length(windows: StillWindows, priors: Priors) -> str:
+    """Return why the lengths cannot be those of a calibrated accelerometer, empty where they can, or were not measured."""
+    if windows.specific_force is None:
+        return ""
+    gravity = np.linalg.norm(windows.gravity, axis=1)
+    away = windows.specific_force - gravity
+    worst = int(np.abs(away).argmax())
+    most = IMPLAUSIBLE * float(np.hypot(priors.bias, priors.scale * gravity[worst]))
+    if abs(away[worst]) <= most:
+        return ""
+    return (
+        f"the specific force at rest is {windows.specific_force[worst]:.2f} m/s^2 long; {gravity[worst]:.2f} ± {most:.2f} is"
+        " expected of a calibrated accelerometer. Its length is not used: ./gravcomp calibrate-imu first"
+    )
+
+
 def length_rows(
     windows: StillWindows, unknowns: Sequence[Unknown], mount: np.ndarray, priors: Priors
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return rows (k, u) and what is expected of them (k,), over their deviations and independent of each other.
 
-    None (k = 0) where no lengths were measured, or no bias is among the unknowns.
+    None (k = 0) where no plausible lengths were measured, or no bias is among the unknowns.
     """
-    if windows.specific_force is None or not any(unknown.kind == "bias" for unknown in unknowns):
+    none = windows.specific_force is None or not any(unknown.kind == "bias" for unknown in unknowns)
+    if none or implausible_length(windows, priors):
         return np.zeros((0, len(unknowns))), np.zeros(0)
     scales = scale_rows(windows.gravity, mount, priors)
     covariance = np.diag(POSE_NOISE**2 / windows.shares) + scales @ scales.T
