@@ -57,7 +57,8 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
         return f"creep of about {times[first]:.3g} s"
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
-        "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
+        "friction": "friction beyond the described one", "slip": "friction inside the material",
+        "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
         "bias": f"bias of the accelerometer along {'xyz'[min(first, 2)]}",
     }  # fmt: skip
     return names[unknown.kind]

@@ -13,6 +13,7 @@ from gravcomp.calibration.unknowns import Unknown, parameters_at
 _MOST_STEPS, _SETTLED = 8, 3e-3  # of the search, and the relative gain with which it ends
 _PARTS = (1.0, 0.5, 0.2)  # of a step, and of the way from the described robot to the first point of a search
 _ROOM = 1e-9  # of the bounds of a step, which must not be empty
+_CHANCE = 3.84  # squares over their variance, one degree of freedom at 95 %
 _NEAR = 0.02  # in the moduli's logarithms, over which derivatives hardly change
 
 
@@ -148,10 +149,10 @@ class Problem:
         return np.maximum(found, smallest)
 
     def worse(self, x: np.ndarray, start: np.ndarray) -> bool:
-        """Return whether x describes positions, directions or both together worse than `start`."""
+        """Return whether x describes positions, directions or both together worse than `start`, by more than chance does."""
         one, other = (self._scaled(self.errors(at)) ** 2 for at in (x, start))
         parts = (slice(0, 3), slice(3, 6), slice(0, 6)) if self._directed else (slice(0, 3),)
-        return any(float(one[:, part].sum()) > float(other[:, part].sum()) for part in parts)
+        return any(float(one[:, part].sum()) > float(other[:, part].sum()) + _CHANCE for part in parts)
 
     def information(self, x: np.ndarray) -> np.ndarray:
         """Return what tips and other data tell about x (u, u), without the prior."""
