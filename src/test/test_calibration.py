@@ -137,10 +137,11 @@ def test_only_the_last_still_window_of_a_stretch_counts():
 
 def test_csv_is_read_as_it_was_written(tmp_path, robot):
     path = tmp_path / "tips.csv"
-    write_csv(course(), path, robot.cable_names)
+    written = dataclasses.replace(course(), specific_force=9.8 + 0.001 * np.arange(60))
+    write_csv(written, path, robot.cable_names)
     read = read_measured(path, robot.cable_names)
-    for name in ("time", "gravity", "displacement", "tip_position", "tip_direction"):
-        np.testing.assert_allclose(getattr(read, name), getattr(course(), name), atol=1e-6)
+    for name in ("time", "gravity", "displacement", "tip_position", "tip_direction", "specific_force"):
+        np.testing.assert_allclose(getattr(read, name), getattr(written, name), atol=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from gravcomp.calibration.fit import fit_statics
+from gravcomp.calibration.force_length import implausible_length, length_rows
 from gravcomp.calibration.measured import Measured, StillWindows
 from gravcomp.calibration.moving import moving
 from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.calibration.plan import Plan, PlannedPose, gravity_of
 from gravcomp.calibration.standstill import Standstill
 from gravcomp.calibration.statics import StaticPredictor
+from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
 from gravcomp.trials.calibration_run import run_plan
@@ -58,6 +60,27 @@ def test_a_mount_does_not_stand_for_a_bias_that_two_orientations_do_not_tell(rob
     assert error["mount", "bias"] < 0.75 * error["mount",]
 
 
+def test_the_length_of_the_specific_force_tells_a_bias_from_a_turned_mount(robot):
+    """In two opposite orientations, with scales that are wrong by their prior: along gravity, where no tip shows it."""
+    measured = gravity_of(0.0, 0.0) * np.array([[1.0], [-1.0]])
+    along = -measured / 9.80665
+    force = 9.80665 * (1.0 + 0.003 * along[:, 0] ** 2) + along @ BIAS
+    windows = StillWindows(measured, np.zeros((2, 0)), np.zeros((2, 3)), np.zeros((2, 3)), specific_force=force)
+    bias = [Unknown("bias", (axis,), Priors().bias) for axis in range(3)]
+    rows, expected = length_rows(windows, bias, np.eye(3), Priors())
+    found = np.linalg.lstsq(np.vstack([rows, np.eye(3)]), np.append(expected, np.zeros(3)), rcond=None)[0] * Priors().bias
+    assert found[0] == pytest.approx(BIAS[0], abs=2e-3) and np.abs(found[1:]).max() < 1e-12
+    assert len(length_rows(dataclasses.replace(windows, specific_force=None), bias, np.eye(3), Priors())[0]) == 0
+    wrong = dataclasses.replace(windows, specific_force=1.03 * force)  # of a chip as it comes from its maker
+    assert "calibrate-imu" in implausible_length(wrong, Priors()) and not implausible_length(windows, Priors())
+    assert len(length_rows(wrong, bias, np.eye(3), Priors())[0]) == 0
+    # The fit has them: two orientations determine no bias by tips alone.
+    tip = StaticPredictor(robot, windows).predict(StaticParameters(np.array([0.3e6]), np.zeros(0), np.zeros(0), bias=BIAS)).tip
+    windows = dataclasses.replace(windows, tip_position=tip[:, :3], tip_direction=tip[:, 3:])
+    fit = fit_statics(robot, windows, groups={"mount", "bias"})
+    assert fit.parameters.bias[0] == pytest.approx(BIAS[0], abs=4e-3)
+
+
 def test_gravity_keeps_its_length_and_loses_bias_and_turn():
     parameters = StaticParameters(np.array([1e6]), np.zeros(0), np.zeros(0), bias=BIAS, mount=np.array([0.0, 0.0, 0.5 * np.pi]))
     force = -orientations() + BIAS  # as an accelerometer reads it
@@ -85,5 +108,6 @@ def test_the_imu_is_as_warm_as_in_use():
     released = np.full(len(setup.robot.cables), setup.robot.limits.displacement_min)
     pose = PlannedPose(0.0, 0.0, released, (), np.zeros(len(released)), np.zeros(3))
     measured = run_plan((setup, Plan((pose,), (0.5,), 0.5, 0.7)))
+    assert 0.05 < np.abs(measured.specific_force[-5:].mean() - 9.80665) < 1.5  # as the IMU reads it, with its bias
     expected = gravity_at_rest(setup, base_orientation(0.0, 0.0))
     assert np.degrees(np.linalg.norm(measured.gravity[-5:].mean(axis=0) - expected) / 9.81) < 0.3

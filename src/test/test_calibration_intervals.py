@@ -9,6 +9,7 @@ from gravcomp.calibration.estimates import unfit
 from gravcomp.calibration.fit import TipNoise, fit_statics
 from gravcomp.calibration.measured import Measured, MeasurementError, StillWindows, still_windows
 from gravcomp.calibration.parameters import StaticParameters
+from gravcomp.calibration.report import origin_of
 from gravcomp.calibration.standstill import Standstill, noise_of
 from gravcomp.calibration.statics import StaticPrediction
 from gravcomp.calibration.unknowns import Priors, Unknown
@@ -102,6 +103,34 @@ def test_what_the_data_do_not_show_keeps_its_value_with_a_reason(robot):
     assert any("compliance" in estimate.name for estimate in unseen)
     assert all(estimate.value == pytest.approx(estimate.initial, rel=1e-9) for estimate in unseen)
     assert any("cannot be told from these data" in warning and "compliance" in warning for warning in fit.warnings)
+
+
+class OneModulus(Springs):
+    """Of the first `count` windows, whose tips move with the moduli of some segments only."""
+
+    def __init__(self, springs: Springs, robot, count: int, told: tuple[float, float]):
+        rows = springs.windows
+        parts = (rows.gravity, rows.displacement, rows.tip_position, rows.tip_direction)
+        super().__init__(robot, StillWindows(*(part[:count] for part in parts)))
+        self._by_modulus *= np.array(told)
+
+
+@pytest.mark.parametrize(("count", "told", "noise", "value"), [(1, (1.0, 0.0), 0.0, 1.06), (3, (0.07, 0.0), 2e-2, 1.0)])
+def test_a_modulus_that_no_tip_shows_follows_the_others_or_stays_as_described(robot, count, told, noise, value):
+    """Of one window its interval is that of the prior, and not four times as wide, as if all unknowns used up data."""
+    whole = measured_springs(robot, 0, 3e-3)
+    few = OneModulus(whole, robot, count, told)
+    described = np.array([material.youngs_modulus for material in robot.materials])
+    compliance = np.array([robot.cable_compliance(cable) for cable in robot.cables])
+    tip = few.predict(StaticParameters(1.06 * described, np.full(len(compliance), TRUE_OFFSET), compliance)).tip
+    tip += noise * np.repeat([robot.length, 1.0], 3) * np.random.default_rng(1).standard_normal(tip.shape)
+    few.windows = dataclasses.replace(few.windows, tip_position=tip[:, :3], tip_direction=tip[:, 3:])
+    fit = fit_statics(robot, few.windows, groups=GROUPS, predictor=few)
+    unseen = fit.estimates[1]
+    assert not unseen.seen and bool(unseen.reason) == bool(noise)
+    assert noise or unseen.interval < 0.8 * unseen.value
+    assert unseen.value == pytest.approx(value * unseen.initial, rel=0.02)
+    assert f"{unseen.value:.4g}" in origin_of("robot", "data", fit)["values_at_95_percent"][unseen.name]
 
 
 def test_a_stretch_that_might_be_none_or_twice_as_much_is_not_told():

@@ -88,6 +88,22 @@ def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
         make_plan(heavy, PERIOD, orientations=orientations)
 
 
+def test_a_robot_whose_motors_wind_in_slowly_gets_fewer_poses_and_a_sentence(robot):
+    """Cables that wind in 0.5 mm/s: released ones are less slack, and a brief plan takes the time that its poses need."""
+    slow = dataclasses.replace(robot, limits=Limits(tension_max=2.0, displacement_rate=5e-4))
+    options = PlanOptions(budget=60.0, fewest=9, most=12, bend=np.radians(15.0))
+    fast_plan, slow_plan = (make_plan(one, PERIOD, options=options, orientations=ORIENTATIONS[:1]) for one in (robot, slow))
+    assert fast_plan.note == "" and re.match(r"there is time for \d poses of [\d.]+ s only \(9 and more", slow_plan.note)
+    assert 3 <= len(slow_plan.poses) < len(fast_plan.poses) and slow_plan.duration <= 60.0
+    loosest = [min(pose.displacement.min() for pose in plan.poses) for plan in (fast_plan, slow_plan)]
+    assert loosest[0] < loosest[1] < -planning.Priors().offset_share * robot.length  # its zero may be wrong by that
+    tight = PlanOptions(budget=10.0, fewest=5, bend=np.radians(15.0))
+    with pytest.raises(ConfigError, match="allow more time"):
+        make_plan(slow, PERIOD, options=dataclasses.replace(tight, rate=np.radians(1.0)), orientations=ORIENTATIONS[:1])
+    assured = make_plan(slow, PERIOD, options=dataclasses.replace(tight, assured=4), orientations=ORIENTATIONS[:1])
+    assert len(assured.poses) >= 4 and assured.duration > 10.0
+
+
 @pytest.mark.parametrize("limits", [{"displacement_min": -1e-6, "displacement_max": 1e-6}, {"tension_max": 2e-4}])
 def test_a_plan_whose_pulls_nobody_can_see_is_refused(robot, limits):
     weak = dataclasses.replace(robot, limits=Limits(**{"tension_max": 2.0, **limits}))

@@ -62,13 +62,13 @@ def forces(model, orientation, position, tension):
 
 @pytest.mark.parametrize("law", ["svk", "neo_hookean"])
 def test_tip_agrees_with_calculix_without_cables(law):
-    # The two laws of the table differ by up to 0.48 mm.
+    # The two laws of the table differ by up to 0.48 mm; with a clamp 15 % too short the rod is 0.15 mm off.
     worst = 0.0
     for row in (row for row in calculix.stored_rows() if row.law == law):
         model = rod(youngs_modulus=row.youngs_modulus, poissons_ratio=row.poissons_ratio, law=law)
         shape = equilibrium(model, 9.81 * np.array([-math.cos(row.inclination), 0.0, -math.sin(row.inclination)]))
         worst = max(worst, float(np.linalg.norm(shape.tip - [0.0, 0.0, 0.1] - row.tip)))
-    assert worst < 0.2e-3
+    assert worst < 0.12e-3
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Measured tips from a rosbag2 folder: poses of the tip, with `gravity` and `cable/state` interpolated to their times."""
+"""Measured tips from a rosbag2 folder: poses, with `gravity`, `cable/state` and `imu/data` interpolated to their times."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.calibration.measured import Measured, MeasurementError
 from gravcomp.recordings.bags import BagError
-from gravcomp.recordings.bags.streams import CABLE_STATE, POSE, VECTOR, Stream, Wanted, read_streams
+from gravcomp.recordings.bags.streams import CABLE_STATE, POSE, SPECIFIC_FORCE, VECTOR, Stream, Wanted, read_streams
 from gravcomp.tip_observer.causes import is_since_boot
 
 TIP_TOPICS = ("measured/tip", "truth/tip")
@@ -25,12 +25,13 @@ def read_bag(path: Path, cables: tuple[str, ...], tip_topic: str | None = None) 
         "gravity": Wanted(VECTOR, ("gravity",)),
         "state": Wanted(CABLE_STATE, ("cable/state",)),
         "tip": Wanted(POSE, (tip_topic,) if tip_topic else TIP_TOPICS),
+        "force": Wanted(SPECIFIC_FORCE, ("imu/data",), optional=True),
     }
     try:
         streams = read_streams(path, wanted)
     except BagError as error:
         raise MeasurementError(str(error)) from error
-    gravity, state, tip = (streams[key] for key in wanted)
+    gravity, state, tip, force = (streams[key] for key in wanted)
     assert gravity is not None and state is not None and tip is not None  # none of them is optional
     if state.values.shape[1] != len(cables):
         raise MeasurementError(f"{path}: '{state.topic}' has {state.values.shape[1]} cables; the robot has {len(cables)}")
@@ -53,6 +54,7 @@ def read_bag(path: Path, cables: tuple[str, ...], tip_topic: str | None = None) 
         displacement=state.at(time),
         tip_position=poses[:, :3],
         tip_direction=_directions(path, tip.topic, poses),
+        specific_force=None if force is None else np.linalg.norm(force.at(time), axis=1),
     )
 
 

@@ -57,7 +57,8 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
         return f"creep of about {times[first]:.3g} s"
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
-        "friction": "friction beyond the described one", "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
+        "friction": "friction beyond the described one", "slip": "friction inside the material",
+        "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
         "bias": f"bias of the accelerometer along {'xyz'[min(first, 2)]}",
     }  # fmt: skip
     return names[unknown.kind]
@@ -96,6 +97,20 @@ def fitted_together(unknowns: list[Unknown], reasons: list[str]) -> list[str]:
     return ["" if own else reason for reason, own in zip(reasons, of_imu)]
 
 
+def moduli_told(unknowns: list[Unknown], reasons: list[str], covariance: np.ndarray) -> list[str]:
+    """Return the reasons with one for the moduli, where the data tell neither one of them nor their common error.
+
+    covariance (u, u): of x. Where they tell one, the others follow it by their prior, which is nearer than what is described.
+    """
+    own = np.array([unknown.kind == "modulus" for unknown in unknowns])
+    block = covariance[np.ix_(own, own)]
+    deviation = float(np.sqrt(min(block.mean(), np.diag(block).min())))
+    if deviation < SEEN_MODULUS:
+        return reasons
+    reason = f"its deviation would be {deviation:.0%}; less than {SEEN_MODULUS:.0%} is needed"
+    return [reason if is_modulus else other for is_modulus, other in zip(own, reasons)]
+
+
 def partners_of(information: np.ndarray, unknowns: list[Unknown], priors: Priors) -> list[list[int]]:
     """Return for each unknown those that no tip tells apart from it, by the weak eigenvectors of the information (u, u) in x.
 
@@ -130,7 +145,7 @@ def estimate(
     before, value = (float(factor * p.values(unknown.kind)[first]) for p in (initial, final))
     name = name_of(robot, unknown, times)
     if unknown.kind == "modulus":
-        return Estimate(name, unit, before, value, value * half, bool(sigma < SEEN_MODULUS), "", "modulus", first)
+        return Estimate(name, unit, before, value, value * half, bool(sigma < SEEN_MODULUS), reason, "modulus", first)
     return Estimate(name, unit, before, value, factor * unknown.scale * half, not reason, reason, unknown.kind, first)
 
 
@@ -149,8 +164,8 @@ def warnings(robot: Robot, unknowns: list[Unknown], estimates: tuple[Estimate, .
         names = ", ".join(e.name for e in alike)
         found.append(f"{names}: cannot be told from these data, and keeps {kept}: {reason}")
     found += [
-        f"{e.name}: these data hardly determine it (± {e.interval:.2g} {e.unit})"
+        f"{e.name}: these data hardly determine it (± {e.interval:.2g} {e.unit}); it follows the other segments"
         for e in estimates
-        if not e.seen and e.kind == "modulus"
+        if not e.seen and e.kind == "modulus" and not e.reason
     ]
     return found

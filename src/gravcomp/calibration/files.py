@@ -3,9 +3,11 @@
 A CSV file has a header and one row per sample:
 
     trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty: released),
-    tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z
+    tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z, specific_force (m/s^2,
+    its length by the IMU)
 
-`trial` may be missing if there is only one. A bag has `gravity`, `cable/state` and the tip as geometry_msgs/PoseStamped.
+`trial` may be missing if there is only one. A bag has `gravity`, `cable/state`, the tip as geometry_msgs/PoseStamped, and, where
+it was recorded, `imu/data`.
 """
 
 import csv
@@ -18,6 +20,7 @@ from gravcomp.calibration.bag import read_bag
 from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import Measured, MeasurementError
 
+_FORCE = "specific_force"
 _VECTORS = (("gravity", ""), ("tip", "_mm"), ("direction", ""))
 """Names and units of the columns with three components."""
 
@@ -37,14 +40,15 @@ def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
     directed = measured.tip_direction is not None
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(csv_header(cables, directed))
+        writer.writerow(csv_header(cables, directed) + [_FORCE] * (measured.specific_force is not None))
         for row in range(len(measured.time)):
             direction = None if measured.tip_direction is None else measured.tip_direction[row]
+            force = [] if measured.specific_force is None else [f"{measured.specific_force[row]:.4f}"]
             writer.writerow(
                 csv_row(
                     int(measured.trial[row]), float(measured.time[row]), measured.gravity[row], measured.displacement[row],
                     measured.tip_position[row], direction,
-                )
+                ) + force
             )  # fmt: skip
 
 
@@ -79,4 +83,5 @@ def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
         displacement=table.vectors(wound, 1e-3, empty=math.nan),
         tip_position=table.vectors(tip, 1e-3),
         tip_direction=table.vectors(direction) if set(direction) <= set(table.header) else None,
+        specific_force=table.numbers(_FORCE) if _FORCE in table.header else None,
     )

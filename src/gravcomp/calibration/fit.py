@@ -1,9 +1,10 @@
 """Least-squares fit of a robot's parameters to resting tips.
 
-    min over x of  sum_k w_k (|(p_k(x) - measured_k) / sigma_p|^2 + |(d_k(x) - measured_k) / sigma_d|^2) + |R x|^2 + weighed
+    min over x of  sum_k w_k (|(p_k(x) - measured_k) / sigma_p|^2 + |(d_k(x) - measured_k) / sigma_d|^2) + |R x|^2 + others
 
 over positions p and, where they are measured, directions d of the tip. R is the prior (`unknowns.Priors`); w_k is the share of a
-window in its rest; `weighed` holds the robot's mass to that of a balance, if one is given. The deviations sigma_p and sigma_d
+window in its rest; the others hold the robot's mass to that of a balance, if one is given, and the bias of the accelerometer to
+the length of the specific force (`force_length`), if the IMU gave it. The deviations sigma_p and sigma_d
 begin at declared values; a second round takes them from the residuals of the first. What the data do not determine is not fitted,
 and says why (`estimates.unfit`); it keeps the described value. Creep that is not described begins at what is usual for the class
 of the material, and stays there where the data do not show it: every polymer creeps, and without it the moduli would stand for
@@ -22,7 +23,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gravcomp.calibration.estimates import Estimate, estimate, fitted_together, name_of, partners_of, unfit, warnings
+from gravcomp.calibration.estimates import Estimate, estimate, fitted_together, moduli_told, name_of, partners_of, unfit, warnings
+from gravcomp.calibration.force_length import implausible_length, length_rows
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
 from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
@@ -122,6 +124,7 @@ def fit_statics(
     problem = Problem(predictor, initial, unknowns, prior_rows(unknowns, priors), sigma, progress)
     if mass is not None:
         problem.weigh(mass, *body_mass(robot), noise.balance)
+    problem.add(*length_rows(windows, unknowns, robot.imu_mount.rotation, priors))
     try:
         bends = problem.bending(np.zeros(len(unknowns)))
     except RuntimeError as error:
@@ -135,7 +138,7 @@ def fit_statics(
     x = problem.solve(np.zeros(len(unknowns)), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     deviation = np.sqrt(np.diag(problem.covariance(x)))
-    quantile = half_width(problem.freedom)
+    quantile = half_width(problem.freedom(x))
     names = [name_of(robot, unknown, creep_times) for unknown in unknowns]
     partners = partners_of(problem.information(x), unknowns, priors)
     reasons = [
@@ -143,6 +146,7 @@ def fit_statics(
         for u, entry, half, others in zip(unknowns, x, deviation, partners)
     ]
     reasons = fitted_together(unknowns, reasons)
+    reasons = moduli_told(unknowns, reasons, problem.covariance(x))
     fitted = np.array([not reason for reason in reasons])
     x = problem.solve(np.where(fitted, x, 0.0), fitted)
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
@@ -176,7 +180,10 @@ def fit_statics(
         rms_before=rms_before,
         rms_after=rms_after,
         evaluations=problem.evaluations,
-        warnings=tuple(warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any()))),
+        warnings=(
+            *warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any())),
+            *filter(None, [implausible_length(windows, priors)]),
+        ),
         creep_times=creep_times,
     )
 

@@ -22,9 +22,10 @@ class Measured:
     displacement: np.ndarray  # (t, m), NaN: released
     tip_position: np.ndarray  # (t, 3)
     tip_direction: np.ndarray | None = None  # (t, 3)
+    specific_force: np.ndarray | None = None  # (t,) m/s^2, its length by the IMU; None: not measured
 
     def __post_init__(self) -> None:
-        for name in ("time", "gravity", "tip_position", "tip_direction"):
+        for name in ("time", "gravity", "tip_position", "tip_direction", "specific_force"):
             values = getattr(self, name)
             if values is not None and not np.isfinite(values).all():
                 raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
@@ -45,10 +46,10 @@ class Measured:
 
     def rows(self, which: np.ndarray) -> "Measured":
         """Return the samples selected by a mask or by indices."""
-        direction = None if self.tip_direction is None else self.tip_direction[which]
+        direction, force = (None if own is None else own[which] for own in (self.tip_direction, self.specific_force))
         return Measured(
             self.source, self.trial[which], self.time[which], self.gravity[which], self.displacement[which],
-            self.tip_position[which], direction,
+            self.tip_position[which], direction, force,
         )  # fmt: skip
 
 
@@ -85,6 +86,7 @@ class StillWindows:
     tip_direction: np.ndarray | None = None  # (k, 3), of length 1; None: not measured
     history: History | None = None  # None: every window is relaxed
     share: np.ndarray | None = None  # (k,): one over the number of windows of the same rest; None: one each
+    specific_force: np.ndarray | None = None  # (k,) m/s^2, its length by the IMU; None: not measured
 
     @property
     def shares(self) -> np.ndarray:
@@ -108,6 +110,7 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             for rows in pieces:
                 window = trial.rows(rows)
                 direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
+                force = np.nan if window.specific_force is None else window.specific_force.mean()
                 found.append(
                     (
                         *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
@@ -116,6 +119,7 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
                         trial.time[began],
                         window.time.mean(),
                         1.0 / len(pieces),
+                        force,
                     )
                 )
     if not found:
@@ -123,11 +127,12 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    gravity, displacement, tip, direction, trials, since, middle, share = (np.array(column) for column in zip(*found))
+    gravity, displacement, tip, direction, trials, since, middle, share, force = (np.array(column) for column in zip(*found))
     directed = measured.tip_direction is not None and np.ptp(measured.tip_direction, axis=0).max() > 0.0
     # A tracker of positions alone publishes one and the same orientation.
     unit = direction / np.linalg.norm(direction, axis=1, keepdims=True) if directed else None
-    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share)
+    forces = None if measured.specific_force is None else force
+    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share, forces)
 
 
 def rests_of(trial: Measured, still: Standstill) -> list[tuple[int, int]]:

@@ -19,7 +19,8 @@ class StaticParameters:
     ratio w; radius (m,): of each cable's place over the described one, minus 1; angle (m,) in rad, beyond the described one;
     density and payload: over the described ones; bias (3,) in m/s^2: of the measured specific force, along the axes of soft_base
     as the mount is described; mount (3,): rotation vector in rad that turns measured gravity without the bias into the true one;
-    creep (b,): stiffness of each branch over the long-term one; friction: added to the coefficient of every cable.
+    creep (b,): stiffness of each branch over the long-term one; friction: added to the coefficient of every cable; slip:
+    stiffness of the friction inside the material over the long-term one (`held_back`).
     """
 
     youngs_modulus: np.ndarray
@@ -34,6 +35,7 @@ class StaticParameters:
     mount: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(3))
     creep: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     friction: float = 0.0
+    slip: float = 0.0
 
     def __post_init__(self) -> None:
         for name in ("radius", "angle"):
@@ -110,17 +112,19 @@ def with_cable_places(robot: Robot, radius: np.ndarray, angle: np.ndarray) -> Ro
 def starting_parameters(robot: Robot, creep_times: tuple[float, ...], *, usual_creep: bool = False) -> StaticParameters:
     """Return the parameters of the robot as it is described, with the creep that it has in the branches of these times in s.
 
-    usual_creep: a body whose creep is not described creeps as its class of materials usually does.
+    usual_creep: a body whose creep is not described creeps as its class of materials usually does, and rubs inside like that.
     """
     material = robot.materials[0]
+    usual, slip = class_of(material.youngs_modulus), 0.0
     creep = np.zeros(len(creep_times))
     for ratio, time in material.branches if creep_times else ():
         creep[int(np.argmin(np.abs(np.log(np.array(creep_times) / time))))] += ratio
+    if usual_creep and creep_times:
+        slip = usual.slip
     if usual_creep and not material.branches:
-        usual = class_of(material.youngs_modulus)
         creep = creep_in_branches(usual.creep_ratio, usual.creep_time, creep_times)
     moduli = np.array([material.youngs_modulus for material in robot.materials])
-    return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep)
+    return StaticParameters(moduli, np.zeros(len(robot.cables)), cable_compliance(robot), creep=creep, slip=slip)
 
 
 def creep_in_branches(ratio: Sequence[float], time: Sequence[float], times: tuple[float, ...]) -> np.ndarray:

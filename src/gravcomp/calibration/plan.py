@@ -20,6 +20,12 @@ class PlanOptions:
     periods: float = parameter(14.0, minimum=2.0, maximum=200.0, description="first periods of the robot at rest in each pose")
     fewest: int = parameter(12, minimum=3, maximum=200, description="poses for whose sake the time at rest is shortened")
     most: int = parameter(26, minimum=3, maximum=500, description="poses beyond which the time at rest is lengthened instead")
+    assured: int = parameter(
+        0,
+        minimum=0,
+        maximum=200,
+        description="poses that are measured even where they take longer than the budget",
+    )
     rate: float = parameter(40.0, edge="deg", minimum=1.0, maximum=360.0, description="speed of the base's turns, deg/s")
     bend: float = parameter(35.0, edge="deg", minimum=1.0, maximum=180.0, description="largest turn of the tip by a cable")
     slack: float = parameter(
@@ -57,13 +63,15 @@ class PlannedPose:
 class Plan:
     """Poses in the order in which they are measured.
 
-    times: for which each is held in s, with the move of the cables; rate: of the base's turns in rad/s; rest: time at rest in s.
+    times: for which each is held in s, with the move of the cables; rate: of the base's turns in rad/s; rest: time at rest in s;
+    note: what limits the plan, a sentence or empty.
     """
 
     poses: tuple[PlannedPose, ...]
     times: tuple[float, ...]
     rest: float
     rate: float
+    note: str = ""
 
     @property
     def duration(self) -> float:

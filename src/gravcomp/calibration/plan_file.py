@@ -26,6 +26,6 @@ def load_plan(path: Path) -> Plan:
             PlannedPose(**{**entry, "pulled": tuple(entry["pulled"]), **{name: np.array(entry[name]) for name in _ARRAYS}})
             for entry in document["poses"]
         ]
-        return Plan(tuple(poses), tuple(document["times"]), document["rest"], document["rate"])
+        return Plan(tuple(poses), tuple(document["times"]), document["rest"], document["rate"], document.get("note", ""))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise MeasurementError(f"{path}: cannot be read as a plan: {error}") from error

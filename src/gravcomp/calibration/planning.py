@@ -20,6 +20,7 @@ import numpy as np
 
 from gravcomp.calibration.approach import APPROACH
 from gravcomp.calibration.fit import TipNoise
+from gravcomp.calibration.force_length import bias_rows, scale_rows
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions
@@ -31,6 +32,7 @@ from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
 from gravcomp.inverse import InverseOptions
 from gravcomp.mesh.coarse import with_coarse_elements
+from gravcomp.orientation.calibration import POSE_NOISE
 
 _MEAN_TURN = math.radians(80.0)  # of the base from station to station
 _LEAST_REST = 0.3  # of the longest time that a pose may take
@@ -87,7 +89,14 @@ def make_plan(
     pull = _pull_time(candidates, robot)
     rest = max(wanted - pull, _LEAST_REST * longest)
     held = rest + pull
-    chosen = _chosen(candidates, usual, rows, prior, _sought(rows, usual, unknowns), held, options)
+    assured = options.assured * held + _MEAN_TURN / options.rate if options.assured else 0.0
+    options = dataclasses.replace(options, budget=max(options.budget, assured))
+    sought = _sought(rows, usual, unknowns)
+    if inverse is not None:  # with motors there is an IMU
+        rows, prior, sought = _with_force_lengths(rows, prior, sought, windows.gravity, unknowns, robot, priors)
+    chosen = _chosen(candidates, usual, rows, prior, sought, held, options)
+    if not chosen:  # there is no time for what is usual at every station
+        chosen = _chosen(candidates, [False] * len(usual), rows, prior, sought, held, options)
     if not chosen:
         raise ConfigError(
             f"robot '{robot.name}': no pose of {held:.0f} s fits into {options.budget:.0f} s; allow more time (--time)"
@@ -95,7 +104,9 @@ def make_plan(
     poses = _ordered([candidates[k] for k in chosen])
     free = next(pose for pose in candidates if pose.station == poses[-1].station and not pose.pulled)
     poses.append(free)  # let go at the end, it swings: the damping
-    plan = Plan(tuple(poses), (held,) * len(poses), rest, options.rate)
+    slow = wanted - pull < _LEAST_REST * longest and len(poses) < options.fewest
+    note = _too_few(len(poses), pull, held, options) if slow else ""
+    plan = Plan(tuple(poses), (held,) * len(poses), rest, options.rate, note)
     # Turns were estimated while poses were chosen.
     less = min(max(plan.duration - options.budget, 0.0) / len(poses), _MOST_OF_REST * rest)
     return dataclasses.replace(plan, times=(held - less,) * len(poses), rest=rest - less)
@@ -141,6 +152,26 @@ def _chosen(
         stations.add(candidates[best].station)
 
 
+def _with_force_lengths(
+    rows: np.ndarray,
+    prior: np.ndarray,
+    sought: np.ndarray,
+    gravity: np.ndarray,
+    unknowns: list[Unknown],
+    robot: Robot,
+    priors: Priors,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows (k, 7, u + 3), prior and A with the length of the specific force in each pose, and the scales behind it."""
+    count, _, known = rows.shape
+    found = np.zeros((count, 7, known + 3))
+    found[:, :6, :known] = rows
+    found[:, 6, :known] = bias_rows(gravity, unknowns) / POSE_NOISE
+    found[:, 6, known:] = scale_rows(gravity, robot.imu_mount.rotation, priors) / POSE_NOISE
+    wider = [np.pad(one, ((0, 3), (0, 3))) for one in (prior, sought)]
+    wider[0][-3:, -3:] = np.eye(3)
+    return found, wider[0], wider[1]
+
+
 def _sought(rows: np.ndarray, usual: list[bool], unknowns: list[Unknown]) -> np.ndarray:
     """Return A (u, u) from rows (k, 6, u); usual: the poses of use."""
     squares, used = np.einsum("kiu,kiv->kuv", rows, rows), np.array(usual)
@@ -154,6 +185,14 @@ def _gain(covariance: np.ndarray, rows: np.ndarray, sought: np.ndarray) -> float
     """Return by how much rows (r, u) over the noise lower the trace of covariance (u, u) times sought (u, u)."""
     known = rows @ covariance
     return float(np.sum(np.linalg.solve(np.eye(len(rows)) + known @ rows.T, known) * (known @ sought)))
+
+
+def _too_few(count: int, pull: float, held: float, options: PlanOptions) -> str:
+    """Return what limits a plan of `count` poses that are held for `held` s, of which the cables move for `pull` s."""
+    return (
+        f"there is time for {count} poses of {held:.1f} s only ({options.fewest} and more are wanted): moves of the cables take"
+        f" up to {pull:.1f} s of each. More time (--time), or capstans that wind in faster, let the data tell more"
+    )
 
 
 def _pull_time(candidates: list[PlannedPose], robot: Robot) -> float:

@@ -12,6 +12,7 @@ import numpy as np
 from gravcomp.calibration.fit import TipNoise
 from gravcomp.calibration.held_pose import held_at_rest
 from gravcomp.calibration.plan import PlannedPose, PlanOptions, gravity_of
+from gravcomp.calibration.unknowns import Priors
 from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.transmission import Transmission
@@ -21,6 +22,8 @@ from gravcomp.simulation import Shape, Simulator
 
 _LEVELS = (0.35, 1.0)  # of the largest tension that is used: two are needed to distinguish an offset from a stretch
 _FARTHER = 1.5  # than the linear model expects, a tip may turn
+_TO_WIND = 0.25  # of a pose's time: at most that much is for slack that is wound in
+_SURE = 2.0  # deviations of a cable's zero
 
 ORIENTATIONS = tuple(
     (math.radians(inclination), math.radians(roll))
@@ -47,7 +50,7 @@ def pose_candidates(
     found: list[tuple[PlannedPose, bool, Equilibrium]] = []
     moves: list[tuple[float, float]] = []
     count = len(robot.cables)
-    slack = options.slack * robot.length
+    slack = _slack(robot, options)
     for number, (inclination, roll) in enumerate(orientations):
         progress(f"planning: orientation {number + 1} of {len(orientations)}")
         gravity = gravity_of(inclination, roll)
@@ -78,6 +81,15 @@ def pose_candidates(
     found = [entry for entry in found if entry[0].displacement.max(initial=0.0) <= robot.limits.displacement_max]
     poses, usual, shapes = zip(*found) if found else ((), (), ())
     return list(poses), list(usual), list(shapes)
+
+
+def _slack(robot: Robot, options: PlanOptions) -> float:
+    """Return by how much in m a released cable is longer than its path.
+
+    Where motors wind in slowly, less than `options.slack`, but no less than the zero of a cable may be wrong by.
+    """
+    wound = _TO_WIND * options.budget / options.most * robot.limits.displacement_rate
+    return max(_SURE * Priors().offset_share * robot.length, min(options.slack * robot.length, wound))
 
 
 def _largest_tension(robot: Robot, free: Shape, options: PlanOptions) -> np.ndarray:

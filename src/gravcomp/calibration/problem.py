@@ -13,6 +13,7 @@ from gravcomp.calibration.unknowns import Unknown, parameters_at
 _MOST_STEPS, _SETTLED = 8, 3e-3  # of the search, and the relative gain with which it ends
 _PARTS = (1.0, 0.5, 0.2)  # of a step, and of the way from the described robot to the first point of a search
 _ROOM = 1e-9  # of the bounds of a step, which must not be empty
+_CHANCE = 3.84  # squares over their variance, one degree of freedom at 95 %
 _NEAR = 0.02  # in the moduli's logarithms, over which derivatives hardly change
 
 
@@ -60,18 +61,26 @@ class Problem:
         row = np.zeros(len(self._unknowns))
         for i, unknown in enumerate(self._unknowns):
             row[i] = unknown.scale * {"density": body, "payload": payload}.get(unknown.kind, 0.0) / (deviation * mass)
-        self._prior = np.vstack([self._prior, row])
-        self._expected = np.append(self._expected, (mass - body - payload - rest) / (deviation * mass))
+        self.add(row[None], np.array([(mass - body - payload - rest) / (deviation * mass)]))
+
+    def add(self, rows: np.ndarray, expected: np.ndarray) -> None:
+        """Add data that no tip shows: rows (k, u) of x and what is expected of them (k,), over their deviations."""
+        self._prior, self._expected = np.vstack([self._prior, rows]), np.concatenate([self._expected, expected])
 
     def bending(self, x: np.ndarray) -> float:
         """Return the farthest that a tip would move in m by e times all moduli."""
         columns = [i for i, unknown in enumerate(self._unknowns) if unknown.kind == "modulus"]
         return float(np.linalg.norm(self._by(x)[:, :3, columns].sum(axis=2), axis=1).max())
 
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of the residuals: a direction has two."""
-        return max(1, round((self._root**2).sum()) * (5 if self._directed else 3) - len(self._unknowns))
+    def freedom(self, x: np.ndarray) -> int:
+        """Return the degrees of freedom of the residuals at x: a direction has two.
+
+        An unknown uses up the share of one that the tips tell of it, and no more where its prior does; all of them the trace of
+        the hat matrix (J. Ye, "On measuring and correcting the effects of data mining and model selection", JASA 93, 1998).
+        """
+        tips = self.jacobian(x)[: -len(self._prior)]
+        used = float(np.sum((tips.T @ tips) * self.covariance(x)))
+        return max(1, round(float((self._root**2).sum()) * (5 if self._directed else 3) - used))
 
     def predict(self, x: np.ndarray) -> StaticPrediction:
         """Return the prediction at x."""
@@ -140,13 +149,13 @@ class Problem:
         return np.maximum(found, smallest)
 
     def worse(self, x: np.ndarray, start: np.ndarray) -> bool:
-        """Return whether x describes positions, directions or both together worse than `start`."""
+        """Return whether x describes positions, directions or both together worse than `start`, by more than chance does."""
         one, other = (self._scaled(self.errors(at)) ** 2 for at in (x, start))
         parts = (slice(0, 3), slice(3, 6), slice(0, 6)) if self._directed else (slice(0, 3),)
-        return any(float(one[:, part].sum()) > float(other[:, part].sum()) for part in parts)
+        return any(float(one[:, part].sum()) > float(other[:, part].sum()) + _CHANCE for part in parts)
 
     def information(self, x: np.ndarray) -> np.ndarray:
-        """Return what data and balance tell about x (u, u), without the prior."""
+        """Return what tips and other data tell about x (u, u), without the prior."""
         own = len(self._unknowns)
         rows = self.jacobian(x)
         return rows.T @ rows - self._prior[:own].T @ self._prior[:own]

@@ -101,8 +101,9 @@ def origin_of(source: str, data: str, statics: StaticFit) -> dict:
     values = {}
     for e in statics.estimates:
         unit = f" {e.unit}".rstrip()
-        kept = f"kept: {e.reason}" if e.reason else "hardly seen in the data"
-        values[e.name] = f"{e.value:.5g} +- {e.interval:.2g}{unit}" if e.seen else f"{e.initial:.5g}{unit}, {kept}"
+        found = f"{e.value:.5g} +- {e.interval:.2g}{unit}"
+        unseen = f"{e.initial:.5g}{unit}, kept: {e.reason}" if e.reason else f"{found}, hardly seen in the data"
+        values[e.name] = found if e.seen else unseen
     return {
         "date": datetime.date.today().isoformat(),
         "robot": source,

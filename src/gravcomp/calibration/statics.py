@@ -3,7 +3,7 @@
 A cable that the motor displaces by u pulls the path in by w u + o - c lambda, where o is its offset, c its compliance, lambda its
 tension and w the winding ratio of all motors. The path itself may lie farther from the axis and be turned about it; gravity acts
 through the density, the payload, and the IMU's bias and mount; the body creeps by branches of given times
-(`full_model.viscosity`).
+(`full_model.viscosity`), and friction inside it holds its tip back (`held_back`).
 
 One model serves all parameters: moduli scale the stiffness of its elements, density and payload its weights. Windows are computed
 in the order of time, so that each begins with what the branches hold (`walk`).
@@ -21,6 +21,7 @@ import numpy as np
 
 from gravcomp.cables.routing import route_cables
 from gravcomp.cables.tendons import Tendons
+from gravcomp.calibration.held_back import held_back, reach_of
 from gravcomp.calibration.load_response import LoadResponse
 from gravcomp.calibration.measured import StillWindows
 from gravcomp.calibration.parameters import StaticParameters, starting_parameters, with_cable_places, with_moduli
@@ -85,7 +86,10 @@ class StaticPredictor:
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
         shown = [step for step in self._walked(parameters) if step.window is not None]
-        return StaticPrediction(np.array([step.tip for step in shown]), np.array([step.tension for step in shown]))
+        tip = np.array([step.tip for step in shown])
+        if parameters.slip:
+            tip = tip - parameters.slip * self._held_back(parameters)
+        return StaticPrediction(tip, np.array([step.tension for step in shown]))
 
     def tips_of(self, displacement: np.ndarray) -> np.ndarray:
         """Return the tips (k, 6) of the described robot where the measured displacements were these (k, m), NaN: released.
@@ -121,6 +125,7 @@ class StaticPredictor:
         shown = [step for step in steps if step.window is not None]
         found = self._by_forces(parameters, shown) if kinds & _FORCES else {}
         found |= {kind: self._differences(parameters, kind, steps, shown) for kind in _WALKED if kind in kinds - found.keys()}
+        found["slip"] = -self._held_back(parameters)[:, :, None]
         by_offset = np.array([step.by_offset for step in shown])
         wound = np.nan_to_num(np.array([self.windows.displacement[step.window] for step in shown]))
         found["offset"] = by_offset
@@ -140,6 +145,10 @@ class StaticPredictor:
             known = self._last[1] if self._last else self._near
             self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, known)
         return self._last[1]
+
+    def _held_back(self, parameters: StaticParameters) -> np.ndarray:
+        """Return (k, 6) by what the tips of the windows stay behind, for a friction as stiff as the body."""
+        return held_back(self._walked(parameters), reach_of(self._robot, self._model), self._robot.length)
 
     def _inputs(self, parameters: StaticParameters, steps: list[Step] | None = None) -> list[Step]:
         """Return the steps (None: its own) with the gravity and displacements that the parameters make of the measured ones."""

@@ -22,7 +22,7 @@ GROUPS = {
     "weight": ("density", "payload"),
     "mount": ("mount",),
     "bias": ("bias",),
-    "creep": ("creep",),
+    "creep": ("creep", "slip"),
     "friction": ("friction",),
 }
 """What may be fitted in addition to the moduli, and the kinds of unknowns that it means."""
@@ -50,8 +50,14 @@ class Priors:
     bias: float = parameter(
         0.05, unit="m/s^2", minimum=1e-4, maximum=1.0, description="bias of an accelerometer along each axis, at its temperature"
     )
+    scale: float = parameter(
+        0.003, minimum=1e-6, maximum=0.5, description="error of each scale of an accelerometer, and of local gravity, relative"
+    )
     creep: float = parameter(
         0.6, minimum=1e-6, maximum=100.0, description="error of a branch of creep, over the largest of the material's class"
+    )
+    slip: float = parameter(
+        0.5, minimum=1e-6, maximum=100.0, description="error of the friction inside the material, over that of its class"
     )
     friction: float = parameter(0.05, minimum=1e-6, maximum=1.0, description="error of the cables' coefficient of friction")
 
@@ -73,7 +79,7 @@ class Unknown:
         """Return the lower bound in x."""
         if self.kind == "modulus":
             return float(np.log(MODULUS_RANGE[0]))
-        if self.kind in ("compliance", "creep", "friction"):  # none of them is below zero
+        if self.kind in ("compliance", "creep", "friction", "slip"):  # none of them is below zero
             return -float(initial.values(self.kind)[list(self.index)].min()) / self.scale
         return -_FARTHEST
 
@@ -93,7 +99,7 @@ def unknowns_of(
 
     They are the moduli, first; of `groups` (None: all `GROUPS`): offset, place, winding of the cables that are taut in a window,
     one compliance for all cables of a segment with a taut cable, density, payload, mount, bias of the accelerometer, branches of
-    creep, friction.
+    creep and friction inside the material, friction of the cables.
     """
     wanted = set(GROUPS) if groups is None else groups
     taut = [c for c in range(len(robot.cables)) if (before.tension[:, c] > _TAUT * robot.limits.tension_max).any()]
@@ -119,8 +125,10 @@ def unknowns_of(
     if "bias" in wanted:
         unknowns += [Unknown("bias", (axis,), priors.bias) for axis in range(3)]
     if "creep" in wanted:
-        scale = priors.creep * max(class_of(robot.materials[0].youngs_modulus).creep_ratio)
+        usual = class_of(robot.materials[0].youngs_modulus)
+        scale = priors.creep * max(usual.creep_ratio)
         unknowns += [Unknown("creep", (b,), scale) for b in range(len(initial.creep))]
+        unknowns += [Unknown("slip", (0,), priors.slip * usual.slip)] * bool(len(initial.creep))
     if "friction" in wanted and taut:
         unknowns.append(Unknown("friction", (0,), priors.friction))
     return unknowns

@@ -32,8 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "Fit a robot to measured tip positions: Young's modulus of each segment, density, zero, stretch and place of each cable,"
         " capstan radius, friction, mount and offset of the IMU, damping and creep, as far as the data tell them. DATA is a CSV"
         " file with the columns trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2),"
-        " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm; or a bag with gravity, cable/state and"
-        " measured/tip (geometry_msgs/PoseStamped in soft_base); or the table that --plan writes, filled in. With --mapping, DATA"
+        " CABLE_mm for every cable (empty: released), tip_x_mm, tip_y_mm, tip_z_mm, and where it is known specific_force (m/s^2,"
+        " its length by the IMU); or a bag with gravity, cable/state, measured/tip (geometry_msgs/PoseStamped in soft_base) and,"
+        " where it was recorded, imu/data; or the table that --plan writes, filled in. With --mapping, DATA"
         " is a table of poses at rest with any"
         " columns, measured by markers anywhere on the robot, under tensions or displacements and hung weights."
         " With --material, DATA is a relaxation or creep test of the robot's material."
@@ -168,9 +169,12 @@ def _planned(args: argparse.Namespace, file: "RobotFile") -> "Plan":
     inverse = None if args.plan else setup.controller.inverse  # by hand, one cable at a time is enough
     period, transmission = first_period(setup.robot), setup.hardware.transmission
     with output.stages("planning") as show:
-        return make_plan(
+        plan = make_plan(
             as_pulled(setup.robot, setup.hardware), period, transmission, plan_options(args), progress=show, inverse=inverse
         )
+    if plan.note:
+        output.note(plan.note)
+    return plan
 
 
 def _measured_live(args: argparse.Namespace, file: "RobotFile") -> Path | None:

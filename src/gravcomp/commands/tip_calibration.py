@@ -125,6 +125,8 @@ def _data(args: argparse.Namespace, setup: "Setup", still: "Standstill", sweep: 
 
     context = Context(setup, sweep, show)
     plan = plan_of(context, plan_options(args))
+    if plan.note:
+        output.note(plan.note)
     measured = measure(context, plan)
     return Data.of(measured, still, weighed(setup) if mass is None else mass, creep_times(plan.rest), plan.duration)
 

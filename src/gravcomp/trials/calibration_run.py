@@ -2,8 +2,9 @@
 
 The base turns from pose to pose of a plan (`calibration.plan`), and the bridge pulls the cables by the planned displacements;
 model and controller take no part. The board is as warm as in use, because its accelerometer's bias changes with the temperature:
-what a fit finds of the IMU holds at that temperature only. Recorded are the estimated gravity, the commanded displacements, and
-the true tip with a tracker's noise (`tracker.Tracker`). The robot is weighed on a balance.
+what a fit finds of the IMU holds at that temperature only. Recorded are the estimated gravity, the length of the
+specific force, the commanded displacements, and the true tip with a tracker's noise (`tracker.Tracker`). The robot is weighed
+on a balance.
 """
 
 import dataclasses
@@ -67,7 +68,12 @@ def plan_of(context: Context, options: PlanOptions | None = None) -> Plan:
     """Return the plan for the context's robot; a brief context has a shorter one. Raises ConfigError, MeshError."""
     options, setup, orientations = options or PlanOptions(), context.setup, ORIENTATIONS
     if context.brief:
-        options = dataclasses.replace(options, budget=_BRIEF * options.budget, fewest=max(_FEWEST, int(_BRIEF * options.fewest)))
+        options = dataclasses.replace(
+            options,
+            budget=_BRIEF * options.budget,
+            fewest=max(_FEWEST, int(_BRIEF * options.fewest)),
+            assured=_FEWEST,
+        )
         orientations = ORIENTATIONS[::_FEWER]
     period = first_period(setup.robot)
     inverse = setup.controller.inverse
@@ -116,9 +122,9 @@ def run_plan(job: tuple[Setup, Plan]) -> Measured:
     for pose, end in zip(plan.poses, _ends(plan)):
         rig.pull(pose.displacement, pose.tension, end)
     rows = slice(0, len(rig.rows), _DECIMATION)
-    time, gravity, displacement, tip, direction = (np.array(column)[rows] for column in zip(*rig.rows))
+    time, gravity, displacement, tip, direction, force = (np.array(column)[rows] for column in zip(*rig.rows))
     tip, direction = Tracker().seen(setup.nominal.length, tip, direction, np.random.default_rng([setup.seed, 0]))
-    return Measured("virtual robot", np.zeros(len(time), int), time, gravity, displacement, tip, direction)
+    return Measured("virtual robot", np.zeros(len(time), int), time, gravity, displacement, tip, direction, force)
 
 
 def _stops(plan: Plan) -> tuple[list[tuple[np.ndarray, float]], float]:
@@ -158,7 +164,7 @@ class _Rig:
         self._transmission = setup.hardware.transmission
         self._sent = np.zeros(len(setup.robot.cables))
         self._outgoing: list[can.Message] = []
-        self._steps, self._gravity = 0, np.zeros(3)
+        self._steps, self._gravity, self._force = 0, np.zeros(3), 0.0
         self.rows: list[tuple] = []
 
     def start(self) -> None:
@@ -190,7 +196,7 @@ class _Rig:
             self._heater.update(stamp_ns, sample.temperature)
             estimate = self._estimator.update(stamp_ns, sample.angular_rate, sample.specific_force)
             if not isinstance(estimate, Problem):
-                self._gravity = np.array(estimate.gravity)
+                self._gravity, self._force = np.array(estimate.gravity), float(np.linalg.norm(estimate.accel))
             if displacement is not None and tension is not None:
                 self._command(displacement, tension, now)
         self._steps += 1
@@ -208,7 +214,7 @@ class _Rig:
             raise LoopFailed(f"the bridge refused a command at {now:.2f} s: {refused}")
         truth = self._virtual.truth
         direction = Rotation.from_quat(truth.tip_orientation).apply((0.0, 0.0, 1.0))
-        self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, direction))
+        self.rows.append((truth.time, self._gravity, self._sent, truth.tip_position, direction, self._force))
 
 
 def _with_true_densities(setup: Setup) -> Robot:

@@ -43,7 +43,7 @@ _EVEN = {
 """Half widths of the even distributions of what is drawn, in the units of `StaticParameters`; the modulus in its logarithm."""
 
 _LINE, _ZERO, _FRICTION = 0.1, 2e-3, 0.1  # stretch, relative; zero of a cable, over the length; coefficient of friction
-_CREEP = 0.3  # of the ratios of a class, relative
+_CREEP = 0.3  # of the ratios of a class, and of its friction, relative
 _TIMES = (0.5, 1.0, 2.0)  # factors of the times of a class, of which each branch has one
 _WINDOWS = 3  # of each rest
 _FIRST = 0.1  # of a rest: the beginning of its first window
@@ -128,6 +128,8 @@ def drawn(robot: Robot, random: np.random.Generator) -> StaticParameters:
     stretch = 1.0 + _LINE * random.uniform(-1.0, 1.0)  # of one maker's line for all
     for cable in range(count):
         found = found.changed("compliance", (cable,), float((stretch - 1.0) * found.compliance[cable]))
+    usual = class_of(robot.materials[0].youngs_modulus)
+    found = found.changed("slip", (0,), float(usual.slip * (1.0 + _CREEP * random.uniform(-1.0, 1.0))))
     return found.changed("friction", (0,), float(_FRICTION * random.uniform(0.0, 1.0)))
 
 

@@ -1,7 +1,6 @@
 """Data of the rod from the true robot: its sections, masses, tendons and material.
 
-A clamped face cannot contract across the axis, which stiffens the body next to it. Compared with three-dimensional finite
-elements (CalculiX) this has the effect of a clamp that lies 0.39 nu^2 h farther along the axis, h half the height of the section.
+Where a section is hindered from contracting across the axis, the rod is stiffer (`held_sections`).
 """
 
 import math
@@ -14,6 +13,7 @@ from gravcomp.description import PointLoad, Robot
 from gravcomp.mesh.mesh import MeshError
 from gravcomp.mesh.robot_axis import rest_axis
 from gravcomp.rest_axis import RestAxis
+from gravcomp.virtual.held_sections import stiffen_held_sections
 from gravcomp.virtual.law_curve import curve_of_law, filaments
 from gravcomp.virtual.material import RodMaterial
 from gravcomp.virtual.rod import RodModel
@@ -22,8 +22,6 @@ from gravcomp.virtual.tendon_friction import TendonFriction
 from gravcomp.virtual.true_robot import TrueRobot
 from gravcomp.virtual.ways import element_marks, routing_of
 
-_CLAMP_COEFFICIENT = 0.39
-_CLAMP_REACH = 2.5  # times the shift of the clamp: the elements over which it is spread
 _LARGEST_TURN = 0.15  # rad by which an element is bent at rest
 _FIRST_BENDING = 3.516  # squared wave number of a cantilever times its length squared
 
@@ -54,7 +52,7 @@ def build_rod(true: TrueRobot) -> RodModel:
             mass[k] += half
             moment[k, :2] += half * np.array(section.centroid)
             inertia[k] += section.inertia(material.density) * length[e] / 2 + across
-    _stiffen_clamp(stretches[0], length, stiffness)
+    stiffen_held_sections(stretches, ends, stiffness)
     for s, one, about_diameter, about_axis in disk_masses(robot):
         k = _nearest(ends, s)
         mass[k] += one
@@ -142,20 +140,6 @@ def _element_ends(true: TrueRobot, axis: RestAxis, stretches: list[Stretch], mor
         count = max(1, math.ceil((b - a) / true.element_length - 1e-6), math.ceil(turn / _LARGEST_TURN))
         ends.append(np.linspace(a, b, count, endpoint=False))
     return np.append(np.concatenate(ends), distinct[-1])
-
-
-def _stiffen_clamp(stretch: Stretch, length: np.ndarray, stiffness: np.ndarray) -> None:
-    """Stiffen the bending of the first elements, so that their compliance is that of a length shorter by the clamp's shift."""
-    section = stretch.section(stretch.start)
-    scale = np.ones(6)
-    for axis, half in ((3, section.half_height), (4, section.half_width)):
-        shift = _CLAMP_COEFFICIENT * stretch.material.poissons_ratio**2 * half
-        count = int(np.searchsorted(np.cumsum(length), _CLAMP_REACH * shift) + 1)
-        reach = float(length[:count].sum())
-        scale[axis] = math.sqrt(reach / max(reach - shift, 0.2 * reach))
-        rows = stiffness[:count]
-        rows[:, axis, :] *= scale[axis]
-        rows[:, :, axis] *= scale[axis]
 
 
 def _place(robot: Robot, axis: RestAxis, load: PointLoad) -> tuple[float, np.ndarray]:

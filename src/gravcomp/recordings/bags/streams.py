@@ -12,6 +12,7 @@ from gravcomp.recordings.bags.rows import Rows, stamp_ns
 
 VECTOR = "geometry_msgs/msg/Vector3Stamped"
 POSE = "geometry_msgs/msg/PoseStamped"
+SPECIFIC_FORCE = "sensor_msgs/msg/Imu"
 CABLE_STATE = "gravcomp_msgs/msg/CableState"
 CABLE_COMMAND = "gravcomp_msgs/msg/CableCommand"
 CONTROLLER_STATUS = "gravcomp_msgs/msg/ControllerStatus"
@@ -130,6 +131,7 @@ def _shape_target(message: Any) -> tuple[float, ...]:
 _VALUES: dict[str, Callable[[Any], tuple[float, ...]]] = {
     VECTOR: lambda message: _vector(message.vector),
     POSE: _pose,
+    SPECIFIC_FORCE: lambda message: _vector(message.linear_acceleration),
     CABLE_STATE: lambda message: tuple(message.displacement),
     CABLE_COMMAND: lambda message: tuple(message.displacement),
     CONTROLLER_STATUS: lambda message: (message.code,),
