@@ -31,9 +31,9 @@ from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_o
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
-# The share of new shapes that the modes have to represent: those of one path in ten may lie near the end of the equilibria. And
-# the share of the trained shapes.
-_MOST_NEW, _MOST_TRAINED = 0.9, 0.98
+# The share of new shapes that the modes have to represent, without the few near the end of the equilibria. And the share of the
+# trained shapes.
+_MOST_NEW, _MOST_TRAINED = 0.95, 0.98
 
 
 @dataclass(frozen=True)
