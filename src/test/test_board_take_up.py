@@ -104,11 +104,11 @@ class Rig:
             self.board.receive(requests.request("zero", motor.can_id - 1))
         self.board.receive(requests.act("run"))
 
-    def run(self, start: float, end: float, milliseconds: int) -> None:
-        """Let the loop want displacements of all cables from `start` to `end` (m); without samples it computes none."""
+    def run(self, start: float | np.ndarray, end: float | np.ndarray, milliseconds: int) -> None:
+        """Let the loop want displacements of all cables (m, or (8,)) from `start` to `end`; without samples it computes none."""
         no_tension = (ctypes.c_float * 8)()
         for target in np.linspace(start, end, milliseconds // 2):
-            targets = (ctypes.c_float * 8)(*[target] * 8)
+            targets = (ctypes.c_float * 8)(*np.broadcast_to(target, 8))
             self.now += 2
             self.motors.step(round(0.002 / TICK), np.zeros(6), SPRING)
             for motor, values in zip(self.hardware.motors, self.motors.feedback()):
@@ -139,3 +139,20 @@ def test_the_loop_on_the_board_takes_up_the_backlash_of_motors_that_only_pull_an
     rig.board.receive(requests.act("stop"))
     rig.run(2e-4, 2e-4, 4)
     assert not rig.motors.commanded.any()
+
+
+def test_the_motors_of_a_robot_go_out_at_the_same_time_once_all_their_targets_stay():
+    rig = Rig()
+    rig.run(0.0, 6e-4, 300)
+    rig.run(6e-4, 3e-4, 300)
+    last = np.full(8, 3e-4)
+    for _ in range(6):  # a seventh of the play in 100 ms: no longer within the band of a target that stays
+        before, last[0] = last.copy(), last[0] - 0.15 * PLAY
+        rig.run(before, last, 100)
+        assert rig.motors.wound[1:].min() > 3e-4 - 2 * RESTS, "one goes out while another target still moves"
+    went_out = np.zeros(6, dtype=int)
+    for _ in range(200):
+        rig.run(last, last, 4)
+        out = (rig.motors.wound < last[:6] - 2 * RESTS) & (went_out == 0)
+        went_out[out] = rig.now
+    assert went_out.min() > 0 and np.ptp(went_out) <= 20

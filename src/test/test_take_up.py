@@ -114,6 +114,21 @@ def test_nothing_moves_afterwards_while_the_command_trembles_and_a_hold_or_a_new
     assert np.abs(rotors[-1] - 4e-4).max() < 0.1e-3, "a new command is followed at once"
 
 
+@pytest.mark.parametrize("joints", [None, *COMMANDS])
+def test_the_motors_of_a_robot_go_out_at_the_same_time_once_all_their_targets_stay(joints):
+    """One that pays out alone pushes the tip aside until its antagonist follows."""
+    rig, slow = Rig(joints=joints), 0.5 * math.radians(0.6) * 0.005
+    rig.move(0.0, 6e-4, 0.0)
+    rig.move(6e-4, 3e-4, 0.0)
+    rotors = rig.run(0.8, lambda time: 3e-4 - np.array([slow * time / 0.1, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert rotors[:, 1:].min() > 3e-4 - 3 * RESTS
+    last = rig.bridge.snapshot().command
+    rotors = rig.run(2.4, np.array(last))  # effort controllers need two seconds
+    out = rotors < np.array(last) - 0.5 * math.radians(0.6) * 0.005
+    assert out.any(axis=0).all() and np.ptp(out.argmax(axis=0)) * 0.002 < 0.05
+    assert np.abs(rig.motors.wound - last).max() < 2 * RESTS
+
+
 def farthest_beyond(targets: list[float], **drive) -> float:
     """How far a rotor that follows at once goes out beyond the last of its targets (m), which rests for a second."""
     take_up = TakeUp(dataclasses.replace(article()[1].drive, **drive), RESTS)

@@ -309,6 +309,7 @@ static void drive(gc_board *board) {
   if (homing) {
     gc_homing_step(&board->homing, board->motors, &board->parameters, gc_board_motors(board), dt);
   }
+  gc_motors_act_together(board->motors, &board->parameters, gc_board_motors(board));
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
     if (!gc_board_has_motor(board, index)) {
       continue;

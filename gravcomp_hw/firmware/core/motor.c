@@ -108,6 +108,25 @@ void gc_motor_follow(gc_motor *motor, const gc_parameters *parameters, uint32_t 
   go(motor, parameters, index, dt, gc_take_up_step(&motor->take_up, parameters, motor->target, at, dt));
 }
 
+static bool only_pulls(const gc_parameters *parameters, uint32_t present, uint32_t index) {
+  return (present >> index & 1u) != 0u && !is_two_way(parameters, index);
+}
+
+void gc_motors_act_together(gc_motor *motors, const gc_parameters *parameters, uint32_t present) {
+  bool still = true;
+  bool due = false;
+  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
+    if (only_pulls(parameters, present, index)) {
+      still = still && gc_take_up_stays(&motors[index].take_up, parameters);
+      due = due || gc_take_up_is_due(&motors[index].take_up, parameters);
+    }
+  }
+  for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
+    motors[index].take_up.waits = !still;
+    motors[index].take_up.joins = still && due;
+  }
+}
+
 bool gc_motor_is_astray(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt) {
   const float velocity = gc_abs(gc_motor_velocity(motor, parameters, index));
   const float lag = gc_abs(motor->loop.setpoint - gc_motor_displacement(motor, parameters, index));

@@ -56,6 +56,9 @@ void gc_motor_drive(gc_motor *motor, const gc_parameters *parameters, uint32_t i
 // The same within the limit of velocity; a motor that only pulls takes up the backlash of its gear where the target rests.
 void gc_motor_follow(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt);
 
+// Let the motors of the mask `present` that only pull take up their backlash at the same time: once all targets stay and one is due.
+void gc_motors_act_together(gc_motor *motors, const gc_parameters *parameters, uint32_t present);
+
 // Whether the motor stalls or runs away while the board drives it; `dt` s since the last look.
 bool gc_motor_is_astray(gc_motor *motor, const gc_parameters *parameters, uint32_t index, float dt);
 

@@ -33,22 +33,41 @@ static void observe(gc_take_up *take_up, float target, float displacement, float
   take_up->started = true;
 }
 
+static float least_of(const gc_parameters *parameters) { return LEAST * gc_parameter_real(parameters, GC_BACKLASH); }
+
+static bool acts(const gc_parameters *parameters) {
+  const bool finer = least_of(parameters) <= gc_position_loop_rest_error(parameters);
+  return gc_parameter_real(parameters, GC_TAKE_UP_TIME) > 0.0f && !finer;
+}
+
+static bool is_loose(const gc_take_up *take_up, const gc_parameters *parameters) {
+  return acts(parameters) && !take_up->done && take_up->loose > least_of(parameters);
+}
+
+bool gc_take_up_stays(const gc_take_up *take_up, const gc_parameters *parameters) {
+  return !acts(parameters) || take_up->since >= gc_parameter_real(parameters, GC_TAKE_UP_TIME);
+}
+
+bool gc_take_up_is_due(const gc_take_up *take_up, const gc_parameters *parameters) {
+  return is_loose(take_up, parameters) && take_up->since >= take_up->rest;
+}
+
 gc_way gc_take_up_step(gc_take_up *take_up, const gc_parameters *parameters, float target, float displacement, float dt) {
   const float play = gc_parameter_real(parameters, GC_BACKLASH);
   const float rest_time = gc_parameter_real(parameters, GC_TAKE_UP_TIME);
   const float rest_error = gc_position_loop_rest_error(parameters);
-  const float width = (1.0f + SPREAD) * play, least = LEAST * play;
+  const float width = (1.0f + SPREAD) * play, least = least_of(parameters);
   const float over = width + 2.0f * rest_error, farthest = gc_parameter_real(parameters, GC_DISPLACEMENT_MIN);
   const float out = gc_max(target - over, farthest);  // the target may tremble after the take-up has begun
   gc_way way = {.target = target, .fastest = gc_parameter_real(parameters, GC_VELOCITY_LIMIT)};
-  if (rest_time <= 0.0f || least <= rest_error) {
+  if (!acts(parameters)) {
     return way;
   }
   observe(take_up, target, displacement, width, least, rest_time);
   take_up->since = gc_min(LATEST * rest_time, take_up->since + dt);
-  const bool rests = !take_up->done && take_up->since >= take_up->rest;
+  const bool allowed = !take_up->waits && (gc_take_up_is_due(take_up, parameters) || take_up->joins);
   const bool has_room = target - over >= farthest;
-  if (take_up->phase == GC_TAKEN_UP && rests && take_up->loose > least && has_room) {
+  if (take_up->phase == GC_TAKEN_UP && allowed && is_loose(take_up, parameters) && has_room) {
     take_up->phase = GC_TAKE_UP_OUT;
     take_up->done = true;
   }

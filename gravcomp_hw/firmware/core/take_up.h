@@ -2,7 +2,8 @@
 //
 //     x = min(w, max(0, x_last - (d - d_last))),   d: displacement of the rotor; 0: on the flank that winds in
 //
-// Where its target rests and the gear may be loose by x, the motor pays out by the largest backlash w and winds in again, once.
+// Where its target rests and the gear may be loose by x, the motor pays out by the largest backlash w and winds in again, once; at
+// the same time as the robot's other motors, when all their targets stay.
 #ifndef GC_TAKE_UP_H
 #define GC_TAKE_UP_H
 
@@ -21,6 +22,8 @@ typedef struct {
   float since;   // s for which it stays
   float rest;    // s after which it is at rest: longer where it creeps
   bool done;     // the motor has gone out for it
+  bool waits;    // another target of the robot does not stay
+  bool joins;    // another motor of the robot begins
   gc_take_up_phase phase;
 } gc_take_up;
 
@@ -31,6 +34,12 @@ typedef struct {
 } gc_way;
 
 void gc_take_up_reset(gc_take_up *take_up);
+
+// Whether the target has stayed for the time of a rest, creeping or not.
+bool gc_take_up_stays(const gc_take_up *take_up, const gc_parameters *parameters);
+
+// Whether the target is at rest, and the gear may be loose.
+bool gc_take_up_is_due(const gc_take_up *take_up, const gc_parameters *parameters);
 
 // The way to `target` (m); displacement (m) is that of the rotor, `dt` (s) the time since the last step.
 gc_way gc_take_up_step(gc_take_up *take_up, const gc_parameters *parameters, float target, float displacement, float dt);

@@ -6,7 +6,7 @@ from gravcomp.description.hardware import Hardware
 from gravcomp.motors.fault_watch import FaultWatch
 from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.rotors import Rotors
-from gravcomp.motors.take_up import TakeUp, targets_to_hold
+from gravcomp.motors.take_up import TakeUp, act_together, targets_to_hold
 
 
 class CableLoops:
@@ -78,6 +78,7 @@ class CableLoops:
         homing = targets is not None
         targets = self.target if targets is None else targets
         displacement, velocity = self._rotors.displacement(), self._rotors.velocity()
+        act_together([take_up for i, take_up in enumerate(self._take_up) if i not in without])
         for i, loop in enumerate(self._loops):
             if i in without:
                 self.currents[i] = 0.0

@@ -22,7 +22,7 @@ from gravcomp.motors.loop import REST_COUNTS, PositionLoop
 from gravcomp.motors.loop_delay import LoopDelay
 from gravcomp.motors.monitor import MotorMonitor
 from gravcomp.motors.setpoint import Setpoint
-from gravcomp.motors.take_up import TakeUp, targets_to_hold
+from gravcomp.motors.take_up import TakeUp, act_together, targets_to_hold
 
 _AWAY = 0.1  # of the following error, at rest away from the setpoint
 _AWAY_TIME = 4.0  # stall times
@@ -148,6 +148,7 @@ class JointLoops:
         """Return where each motor goes now on its way to its target (m), and how fast at most (m/s; None: the drive's limit)."""
         goals = list(self.target)
         limits: list[float | None] = [None] * len(goals)
+        act_together(self._take_up)
         for i, (take_up, position) in enumerate(zip(self._take_up, self._positions())):
             if take_up is not None:
                 goals[i], limits[i] = take_up.step(self.target[i], displacement[i], dt, position)

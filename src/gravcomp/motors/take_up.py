@@ -11,6 +11,9 @@ How loose the gear may be follows from the rotor as in a play operator of the la
 
 A target that stays is taken up once, so that nothing moves at rest.
 
+The motors of a robot go out and in again at the same time, when all their targets stay: antagonists that pay out together leave
+the tip where it is. One alone pushes it aside, and as long as its antagonist is still too short, the tip rests aside, too.
+
 A target that creeps also stays for a while. It leaves its band slowly, and the next one only counts as rest when it stays there
 for `_STAYS` times as long as in the last, or for `_LATEST` rests. So a target that creeps steadily or turns round on a parabola
 is not taken up: a parabola spends at most (1 + sqrt(2))^2 times as long in the band around its vertex as in the one before.
@@ -37,7 +40,10 @@ class _Phase(enum.Enum):
 
 
 class TakeUp:
-    """Takes up the backlash of one motor that only pulls."""
+    """Takes up the backlash of one motor that only pulls.
+
+    Attributes, set by `act_together`: waits (another target of the robot does not stay), joins (another motor begins).
+    """
 
     def __init__(self, drive: Drive, rest_error: float, stay: float = 0.0):
         """rest_error: distance in m from its target at which the position loop is at rest.
@@ -51,6 +57,7 @@ class TakeUp:
         self._stay = stay
         self._acts = self._time > 0.0 and self._least > rest_error
         self._speed = min(drive.velocity_limit, self._over / (_WAY * self._time)) if self._acts else drive.velocity_limit
+        self.waits = self.joins = False
         self.reset()
 
     def reset(self) -> None:
@@ -60,6 +67,16 @@ class TakeUp:
         self._kept: float | None = None  # target that stays, for `_since` s
         self._phase, self._since, self._out, self._done = _Phase.NONE, 0.0, 0.0, False
         self._rest = self._time  # s, after which a target that stays is at rest
+
+    @property
+    def stays(self) -> bool:
+        """Whether the target has stayed for the time of a rest, creeping or not."""
+        return not self._acts or self._since >= self._time
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the target is at rest, and the gear may be loose."""
+        return self._is_loose and self._since >= self._rest
 
     @property
     def moves(self) -> bool:
@@ -81,7 +98,7 @@ class TakeUp:
             self._rest = min(max(1.0, _STAYS * self._since / self._time), _LATEST) * self._time if crept else self._time
             self._phase, self._kept, self._since, self._done = _Phase.NONE, target, 0.0, False
         self._since += dt
-        if self._phase is _Phase.NONE and self._is_due(target):
+        if self._phase is _Phase.NONE and self._begins(target):
             self._phase, self._out, self._done = _Phase.OUT, 0.0, True
         place = displacement if setpoint is None else setpoint
         outward = max(target - self._over, self._farthest)  # the target may tremble after the take-up has begun
@@ -94,9 +111,22 @@ class TakeUp:
             return outward, None
         return target, self._speed if self._phase is _Phase.IN else None
 
-    def _is_due(self, target: float) -> bool:
-        rests = not self._done and self._since >= self._rest
-        return rests and self._loose > self._least and target - self._over >= self._farthest
+    @property
+    def _is_loose(self) -> bool:
+        return self._acts and not self._done and self._loose > self._least
+
+    def _begins(self, target: float) -> bool:
+        allowed = not self.waits and (self.is_due or self.joins)
+        return allowed and self._is_loose and target - self._over >= self._farthest
+
+
+def act_together(take_ups: Sequence[TakeUp | None]) -> None:
+    """Let the motors of a robot begin at the same time: as soon as all targets stay and one is at rest with a loose gear."""
+    own = [take_up for take_up in take_ups if take_up is not None]
+    still = all(take_up.stays for take_up in own)
+    begin = still and any(take_up.is_due for take_up in own)
+    for take_up in own:
+        take_up.waits, take_up.joins = not still, begin
 
 
 def targets_to_hold(targets: Sequence[float], take_ups: Sequence[TakeUp | None], setpoints: Sequence[float]) -> list[float]:
