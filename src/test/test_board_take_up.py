@@ -146,7 +146,7 @@ def test_the_motors_of_a_robot_go_out_at_the_same_time_once_all_their_targets_st
     rig.run(0.0, 6e-4, 300)
     rig.run(6e-4, 3e-4, 300)
     last = np.full(8, 3e-4)
-    for _ in range(6):  # a seventh of the play in 100 ms: no longer within the band of a target that stays
+    for _ in range(6):  # 0.15 of the backlash in 100 ms: no longer within the band of a target that stays
         before, last[0] = last.copy(), last[0] - 0.15 * PLAY
         rig.run(before, last, 100)
         assert rig.motors.wound[1:].min() > 3e-4 - 2 * RESTS, "one goes out while another target still moves"
