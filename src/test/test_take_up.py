@@ -13,7 +13,7 @@ from gravcomp.closed_loop.bridged_joints import BridgedJoints
 from gravcomp.description.hardware import Hardware
 from gravcomp.description.joint_motors import COMMANDS
 from gravcomp.motors.bridge import Bridge
-from gravcomp.motors.take_up import TakeUp
+from gravcomp.motors.take_up import TakeUp, act_together
 from gravcomp.virtual.draw import draw
 from gravcomp.virtual.motors import TICK, MotorBank
 
@@ -127,6 +127,21 @@ def test_the_motors_of_a_robot_go_out_at_the_same_time_once_all_their_targets_st
     out = rotors < np.array(last) - 0.5 * math.radians(0.6) * 0.005
     assert out.any(axis=0).all() and np.ptp(out.argmax(axis=0)) * 0.002 < 0.05
     assert np.abs(rig.motors.wound - last).max() < 2 * RESTS
+
+
+def test_motors_whose_targets_have_crept_begin_at_the_same_time():
+    """Alone, each would wait for several times as long as its target stayed before."""
+    take_ups, began = [TakeUp(article()[1].drive, RESTS) for _ in range(2)], {}
+    rotors = [1e-3, 1e-3]
+    for step in range(400):
+        slow, fast = 12e-6 * min(step / 60, 1.0), 12e-6 * min(max(step - 100, 0) / 30, 1.0)
+        targets = [1e-3 if step < 100 else 5e-4 - fast, 1e-3 - slow]
+        act_together(take_ups)
+        for k, take_up in enumerate(take_ups):
+            rotors[k], _ = take_up.step(targets[k], rotors[k], 0.004)
+            if take_up.moves:
+                began.setdefault(k, step)
+    assert began[0] == began[1] < 300
 
 
 def farthest_beyond(targets: list[float], **drive) -> float:

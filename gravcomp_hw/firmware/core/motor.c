@@ -122,7 +122,7 @@ void gc_motors_act_together(gc_motor *motors, const gc_parameters *parameters, u
     }
   }
   for (uint32_t index = 0; index < GC_MOTORS_MOST; index++) {
-    motors[index].take_up.waits = !still;
+    motors[index].take_up.waits = !(still && due);
     motors[index].take_up.joins = still && due;
   }
 }

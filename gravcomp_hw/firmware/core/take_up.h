@@ -22,8 +22,8 @@ typedef struct {
   float since;   // s for which it stays
   float rest;    // s after which it is at rest: longer where it creeps
   bool done;     // the motor has gone out for it
-  bool waits;    // another target of the robot does not stay
-  bool joins;    // another motor of the robot begins
+  bool waits;    // for the other motors of the robot
+  bool joins;    // one of them begins
   gc_take_up_phase phase;
 } gc_take_up;
 

@@ -42,7 +42,7 @@ class _Phase(enum.Enum):
 class TakeUp:
     """Takes up the backlash of one motor that only pulls.
 
-    Attributes, set by `act_together`: waits (another target of the robot does not stay), joins (another motor begins).
+    Attributes, set by `act_together`: waits (for the other motors of the robot), joins (one of them begins).
     """
 
     def __init__(self, drive: Drive, rest_error: float, stay: float = 0.0):
@@ -123,10 +123,9 @@ class TakeUp:
 def act_together(take_ups: Sequence[TakeUp | None]) -> None:
     """Let the motors of a robot begin at the same time: as soon as all targets stay and one is at rest with a loose gear."""
     own = [take_up for take_up in take_ups if take_up is not None]
-    still = all(take_up.stays for take_up in own)
-    begin = still and any(take_up.is_due for take_up in own)
+    begin = all(take_up.stays for take_up in own) and any(take_up.is_due for take_up in own)
     for take_up in own:
-        take_up.waits, take_up.joins = not still, begin
+        take_up.waits, take_up.joins = not begin, begin
 
 
 def targets_to_hold(targets: Sequence[float], take_ups: Sequence[TakeUp | None], setpoints: Sequence[float]) -> list[float]:
