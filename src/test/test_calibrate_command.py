@@ -179,6 +179,20 @@ def test_a_bag_of_another_clock_or_without_numbers_is_refused(here, first_cable,
         read_measured("bag", load_robot_file("article").robot.cable_names)
 
 
+def test_the_length_of_the_specific_force_is_that_of_imu_data_in_a_bag_and_stays_in_a_table(here):
+    cables = load_robot_file("article").robot.cable_names
+    with TopicBag(here / "bag") as bag:
+        for time in np.arange(1.0, 3.0, 0.1):
+            bag.vector("/gravity", time, [-9.8, 0.0, 0.0])
+            bag.state("/cable/state", time, np.zeros(len(cables)))
+            bag.pose("/measured/tip", time, [0.0, 0.0, 0.1])
+            bag.imu("/imu/data", time, np.zeros(3), [0.0, 6.0, 8.0 + 0.1 * time])
+    found = read_measured("bag", cables)
+    assert found.specific_force == pytest.approx(np.hypot(6.0, 8.0 + 0.1 * (found.time - found.time[0] + 1.0)), abs=1e-3)
+    write_csv(found, here / "table.csv", cables)
+    assert read_measured("table.csv", cables).specific_force == pytest.approx(found.specific_force, abs=1e-4)
+
+
 def write_bag(path: Path, measured: Measured, clock: float = 0.0, lost: float | None = None) -> None:
     """Write the measurement as topics of the graph, two seconds between trials; released cables are paid out.
 
