@@ -43,6 +43,15 @@ VIRTUAL_ITSELF = ("virtual_self_contact",)
 PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED + ITSELF + VIRTUAL_ITSELF
 """All parts."""
 
+_CALLED = {
+    "reduced": ("model",),
+    "contact": ("reduced",),
+    "self_contact": ("contact",),
+    "surroundings": ("controller",),
+    "virtual_self_contact": ("virtual_robot",),
+}
+"""Parts most of whose functions a part calls as well: two processes that begin at the same time would both compile them."""
+
 
 def around(scene: "Scene", zones: "Scene", virtual: bool) -> tuple[str, ...]:
     """Return the parts that a robot with these obstacles and forbidden zones, and a virtual one, need in addition."""
@@ -68,9 +77,13 @@ def start(parts: Iterable[str]) -> list[subprocess.Popen]:
 
 
 def compile_part(part: str) -> None:
-    """Compile one part, unless it is compiled; wait when another process compiles it."""
+    """Compile one part after those that it calls, unless it is compiled; wait when another process compiles one of them."""
     folder = compiled_folder()
     mark = _mark(folder, part)
+    if mark.exists():
+        return
+    for called in _CALLED.get(part, ()):
+        compile_part(called)
     with open(folder / f"{part}.lock", "w", encoding="utf-8") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not mark.exists():
