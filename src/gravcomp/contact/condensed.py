@@ -129,7 +129,7 @@ def contact_forces(
         body = compliance.copy()
         for i in range(c):
             body[m + i, m + i] += yielding[i]
-        settled = not leaves(0, body, whole, friction, turning, wound, given, c)
+        settled = not leaves(np.int64(0), body, whole, friction, turning, wound, given, c)
     return whole, changes, state, settled
 
 

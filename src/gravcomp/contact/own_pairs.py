@@ -31,7 +31,7 @@ def may_touch(surface: OwnSurface, sections: np.ndarray, margin: float) -> bool:
         longest = max(longest, distance_of(sections, i, i - 1))
     reach, thickest = margin + longest**2 / (8.0 * surface.radius.min()), surface.radius.max()
     for i in range(1, n):
-        j = 0
+        j = np.int64(0)  # no literal, as in `find_own`
         while j < n and apart(surface, i, j):
             distance = distance_of(sections, i, j) - surface.radius[i]
             if distance - surface.radius[j] < reach:
@@ -79,7 +79,7 @@ def near_pairs(
     for i in range(1, n):
         radius = surface.radius[i]
         reach = margin + size[i] + fastest + sag
-        j = 0
+        j = np.int64(0)  # no literal, as in `find_own`
         while j < n and apart(surface, i, j):
             distance = distance_of(sections, i, j)
             if distance - radius - surface.radius[j] < reach or known(i, j, pressed, force):

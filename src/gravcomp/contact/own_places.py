@@ -76,7 +76,8 @@ def find_own(
     """
     n, surface = len(surface.place), strained(surface, sections)
     station, other, count = near_pairs(surface, sections, moved, margin, pressed, force)
-    result, found = empty_own_places(count + len(surface.rim)), 0
+    # No literals, here and for `_write`: Numba would compile what they are passed to for each literal as well.
+    result, found = empty_own_places(count + len(surface.rim)), np.int64(0)
     far, near, normal = end_on_curve(), end_on_curve(), np.empty(3)
     for k in range(count):
         i, j = station[k], other[k]
@@ -212,7 +213,7 @@ def _tip(
                 point[v] = tip[0, v] + x * tip[1, v] + y * tip[2, v]
             gap = nearest(surface, sections, point, start, low, high, near, normal)
             if asked or gap < margin or gap + _approach(moved, far, near, normal) < margin:
-                _write(surface, sections, RIM, n + k, (x, y), (0.0, 0.0), far, near, normal, result, found)
+                _write(surface, sections, np.int64(RIM), n + k, (x, y), (0.0, 0.0), far, near, normal, result, found)
                 found, lowest = found + 1, min(lowest, gap)
     # The nearest point of the rim, by its angle.
     angle = math.atan2(ahead_y, ahead_x)
@@ -234,7 +235,7 @@ def _tip(
     wanted = asked or gap < margin or gap + _approach(moved, far, near, normal) < margin
     if wanted and gap < lowest - _WORTH * radius:
         c, s = radius * math.cos(angle), radius * math.sin(angle)
-        _write(surface, sections, ROUND, n - 1, (c, s), (-s, c), far, near, normal, result, found)
+        _write(surface, sections, np.int64(ROUND), n - 1, (c, s), (-s, c), far, near, normal, result, found)
         found += 1
     return found
 

@@ -103,7 +103,7 @@ def find_places(
             if last[k, s, 0] != 0.0 or last[k, s, 1] != 0.0 or last[k, s, 2] != 0.0:
                 chosen[k, max(s - 1, 0) : s + 2] = True
     gap = all_gaps(scene, surface, sections, reach, chosen, own, normal)
-    count = 0
+    count = np.int64(0)  # no literal: Numba would compile what it is passed to for the literal 0 as well
     for k in range(rows):
         for s in range(stations):
             if gap[k, s] < reach[s] and not chosen[k, s]:
@@ -137,7 +137,7 @@ def find_places(
             chosen[k, stations - 1] = False
             count -= 1
     result = empty_places(count)
-    i = 0
+    i = np.int64(0)
     for k in range(rows):
         for s in range(stations):
             if chosen[k, s]:

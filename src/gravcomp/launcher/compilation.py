@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gravcomp.full_model.robot_model import RobotModel
     from gravcomp.reduction.reduced_model import ReducedModel
     from gravcomp.scene.scene import Scene
+    from gravcomp.simulation import Simulator
 
 LOOP = ("model", "controller")
 """Parts of the nodes of the loop."""
@@ -28,8 +29,8 @@ LOOP = ("model", "controller")
 VIRTUAL = ("virtual_robot",)
 """Parts of the virtual robot."""
 
-SURROUNDED = ("contact", "surroundings")
-"""Parts of a robot with obstacles or zones around it, of the model and of the controller; the set-up does not compile them."""
+SURROUNDED = ("contact", "reduced_contact", "surroundings")
+"""Parts of a robot with obstacles or zones around it, of both models and of the controller; the set-up does not compile them."""
 
 REDUCED = ("reduced",)
 """Part of the reduced model, at rest and in motion, which is otherwise compiled when one is built."""
@@ -45,9 +46,10 @@ PARTS = VIRTUAL + LOOP + REDUCED + SURROUNDED + ITSELF + VIRTUAL_ITSELF
 
 _CALLED = {
     "reduced": ("model",),
-    "contact": ("reduced",),
+    "contact": ("model",),
+    "reduced_contact": ("reduced", "contact"),
     "self_contact": ("contact",),
-    "surroundings": ("controller",),
+    "surroundings": ("controller", "contact"),
     "virtual_self_contact": ("virtual_robot",),
 }
 """Parts most of whose functions a part calls as well: two processes that begin at the same time would both compile them."""
@@ -112,21 +114,31 @@ def _model() -> None:
 
 
 def _contact() -> None:
-    """Let the article's robot lie on a floor that rubs, with the full model and with a reduced one of a few shapes."""
+    """Let the article's robot lie on a floor that rubs, with the full model."""
     import numpy as np
 
-    from gravcomp.description import load_robot_file
+    simulator = _on_a_floor()
+    for cables in (None, np.zeros(simulator.model.tendons.count)):
+        simulator.step(np.array([-9.81, 0.0, 0.0]), cables)
+
+
+def _reduced_contact() -> None:
+    """Let it do so with a reduced model of a few shapes."""
     from gravcomp.reduction.serving import ReducedServing
+
+    simulator = _on_a_floor()
+    ReducedServing(simulator.model, _small_reduced_model(simulator.model), simulator.solver).warm_up()
+
+
+def _on_a_floor() -> "Simulator":
+    from gravcomp.description import load_robot_file
     from gravcomp.scene import PlaneWall, SceneSection
     from gravcomp.scene.scene import Scene
     from gravcomp.simulation import Simulator
 
     robot = load_robot_file("article").robot
     floor = PlaneWall(name="floor", normal=(1.0, 0.0, 0.0), point=(-0.1 * robot.length, 0.0, 0.0), friction=0.2)
-    simulator = Simulator(robot, reduced=False, scene=Scene(SceneSection(planes=(floor,))))
-    for cables in (None, np.zeros(len(robot.cables))):
-        simulator.step(np.array([-9.81, 0.0, 0.0]), cables)
-    ReducedServing(simulator.model, _small_reduced_model(simulator.model), simulator.solver).warm_up()
+    return Simulator(robot, reduced=False, scene=Scene(SceneSection(planes=(floor,))))
 
 
 def _itself() -> None:
@@ -211,6 +223,7 @@ _WORK = {
     "virtual_robot": _virtual_robot,
     "reduced": _reduced,
     "contact": _contact,
+    "reduced_contact": _reduced_contact,
     "surroundings": _surroundings,
     "self_contact": _itself,
     "virtual_self_contact": _virtual_itself,

@@ -87,7 +87,7 @@ def tracked_touching(
     factor = np.zeros((r, r))
     forces, held, pressing = np.zeros((0, 3)), np.zeros(0, dtype=np.int64), np.zeros((0, m))
     sections = touching.start  # linear in q: each step adds what it moves
-    places = empty_places(0)
+    places = empty_places(np.int64(0))  # no literal, as in `find_places`
     for iteration in range(iterations):
         stress = scale * point.strain + offset
         rough = before > calm and not reuse
@@ -196,7 +196,7 @@ def tracked_touching(
         forget(kept)
     displacement = point.tendons.displacement + stretch(cables, point.tendons) * tension
     if not converged:
-        places, forces, held = empty_places(0), np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
+        places, forces, held = empty_places(np.int64(0)), np.zeros((0, 3)), np.zeros(0, dtype=np.int64)
     touched = pressed_places(touching.scene, touching.surface, places, forces, held, pressing, sections)
     return converged, point, expected, q, tension, displacement, compliance, answer, residual, touched
 
