@@ -68,10 +68,10 @@ def loaded_shape(args: argparse.Namespace) -> "tuple[Simulator, Shape, Command |
             raise ValueError(f"{option} has {len(values)} numbers; {needed}")
     wanted = _wanted(args, file.robot.length)
     if file.scene or file.zones:
-        parts = compilation.LOOP + compilation.SURROUNDED
+        parts = [*compilation.LOOP, *compilation.SURROUNDED]
         if wanted is None:
-            parts = ("model", "contact") if args.full else ("model", "contact", "reduced_contact")
-        compile_parts(parts + (compilation.ITSELF if file.scene.self_contact else ()))
+            parts = ["model", "contact"] if args.full else ["model", "contact", "reduced_contact"]
+        compile_parts((*parts, *(compilation.ITSELF if file.scene.self_contact else ())))
     choose_mesh(file.robot)
     simulator = Simulator(file.robot, reduced=not args.full, scene=file.scene)
     gravity = np.array(args.gravity)
