@@ -18,6 +18,7 @@ from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.held_sections import held_depth
 from gravcomp.virtual.parameters import Body, Tendons, VirtualRobotParameters
 from gravcomp.virtual.sliced_body import slice_of
+from gravcomp.virtual.widening import across_energy, widened_strains
 
 SOFT = {"youngs_modulus_mpa": 0.8, "poissons_ratio": 0.45, "density": 1145.0}
 NITINOL = {"youngs_modulus_mpa": 60000.0, "poissons_ratio": 0.3, "density": 6450.0}
@@ -141,16 +142,18 @@ def energy(rod, shape) -> float:
     """Elastic energy of the rod, J."""
     from gravcomp.virtual.rod import strains
 
-    strain = np.empty((rod.elements, 6))
+    strain, own = np.empty((rod.elements, 6)), np.empty((rod.elements, 6))
     strains(shape.orientation, shape.position, rod.length, strain)
-    off = strain - rod.rest_strain
+    widened_strains(strain, rod.rest_strain, rod.filament, rod.curve, own)
+    off = own - rod.rest_strain
     linear = 0.5 * np.einsum("e,ei,eij,ej->", rod.length, off, rod.stiffness, off)
     # The law's curve: integral of c e^2 + d e^3 in each filament, whose strain e stays on this side of the straight part.
     of_filament = off[:, 2, None] + off[:, 3, None] * rod.filament[:, :, 0] + off[:, 4, None] * rod.filament[:, :, 1]
     c, d, folding = (rod.curve[:, i, None] for i in range(3))
     assert np.all(of_filament > folding)
     curved = np.einsum("e,ef,ef->", rod.length, rod.filament[:, :, 2], c * of_filament**3 / 3 + d * of_filament**4 / 4)
-    return float(linear + curved)
+    moved = sum(s * across_energy(x, y, a) for s, (x, y), a in zip(rod.length, off[:, 3:5], rod.across))
+    return float(linear + curved + moved)
 
 
 def test_section_constants_of_closed_forms():

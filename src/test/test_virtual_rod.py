@@ -17,6 +17,7 @@ from gravcomp.virtual.law_curve import curve_of_law, filaments
 from gravcomp.virtual.rod import strains
 from gravcomp.virtual.routing import tendon_lengths
 from gravcomp.virtual.se3 import advance, motion_exp, motion_log
+from gravcomp.virtual.widening import widened_strains
 
 
 def rod(law="svk", **changes):
@@ -27,12 +28,13 @@ def rod(law="svk", **changes):
 def forces(model, orientation, position, tension):
     """Residual of the free cross-sections, band, gradient and path lengths at a state."""
     n, m = model.elements, model.tendons
-    strain, path = np.empty((n, 6)), np.empty((m, n))
+    strain, own, path = np.empty((n, 6)), np.empty((n, 6)), np.empty((m, n))
     direction, chord = model.scratch()
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     band = np.empty((6 * n, 2 * half_bandwidth(model.routing.reach) + 1))
     strains(orientation, position, model.length, strain)
-    tendon_lengths(orientation, position, strain, model.length, model.routing, direction, chord, path)
+    widened_strains(strain, model.rest_strain, model.filament, model.curve, own)
+    tendon_lengths(orientation, position, own, model.length, model.routing, direction, chord, path)
     residual = assemble(
         orientation,
         model.length,
@@ -42,6 +44,7 @@ def forces(model, orientation, position, tension):
         np.zeros((n, 6)),
         model.filament,
         model.curve,
+        model.across,
         np.zeros(n),
         np.zeros(n),
         np.zeros((n, 2)),
