@@ -90,7 +90,9 @@ def test_a_filament_stiffens_with_its_strain_as_the_described_law_says(law, cons
     assert d is None or found[1] == pytest.approx(d, abs=0.02)
 
 
-@pytest.mark.parametrize(("law", "ratio", "q"), [("svk", 0.45, -0.45 / 2 - 0.45**2), ("neo_hookean", 0.4999, 0.25), ("svk", 0.0, 0.0)])
+@pytest.mark.parametrize(
+    ("law", "ratio", "q"), [("svk", 0.45, -0.45 / 2 - 0.45**2), ("neo_hookean", 0.4999, 0.25), ("svk", 0.0, 0.0)]
+)
 def test_a_bar_widens_with_its_compression_as_the_described_law_says(law, ratio, q):
     """St. Venant-Kirchhoff: s^2 = 1 - nu (l^2 - 1); neo-Hookean, incompressible: s = l^(-1/2)."""
     found = curve_of_law(Material(law=law, youngs_modulus=0.3e6, poissons_ratio=ratio))[3:]

@@ -69,7 +69,9 @@ def build_rod(true: TrueRobot) -> RodModel:
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
     spring = lines.axial_stiffness / (lines.free_length + inside)
-    return RodModel(length, stiffness, filament, curve, moved, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring)
+    return RodModel(
+        length, stiffness, filament, curve, moved, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring
+    )
 
 
 def build_material(model: RodModel, true: TrueRobot) -> RodMaterial:

@@ -269,7 +269,14 @@ class MovingRod:
         strains(self.orientation, self.position, model.length, self.strain)
         widened_strains(self.strain, model.rest_strain, model.filament, model.curve, self._own_strain)
         tendon_lengths(
-            self.orientation, self.position, self._own_strain, model.length, model.routing, self._direction, self._chord, self._path
+            self.orientation,
+            self.position,
+            self._own_strain,
+            model.length,
+            model.routing,
+            self._direction,
+            self._chord,
+            self._path,
         )
         self.shortened[:] = model.tendon_length - self._path.sum(axis=1)
 

@@ -104,9 +104,7 @@ def assemble(
             theta[i] = strain[e, i] * length[e]
         inverse_jacobians(theta, left, right)
         s, rate, second = widened(strain[e], rest_strain[e], filament[e], curve[e], own, change)
-        _material(
-            own, rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], of_own, tangent
-        )
+        _material(own, rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], of_own, tangent)
         _add_curve(own, rest_strain[e], filament[e], curve[e], of_own, tangent)
         add_across(own[3] - rest_strain[e, 3], own[4] - rest_strain[e, 4], across[e], of_own, tangent)
         for c in range(m):

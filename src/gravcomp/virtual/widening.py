@@ -84,8 +84,10 @@ def add_across(x: float, y: float, across: np.ndarray, sigma: np.ndarray, tangen
 
 
 @njit(cache=True, error_model="numpy")
-def widened_strains(strain: np.ndarray, rest_strain: np.ndarray, filament: np.ndarray, curve: np.ndarray, out: np.ndarray) -> None:
-    """Write epsilon_s of each element to out (n, 6); strain, rest_strain (n, 6), filament (n, 9, 3) and curve (n, 5): of the rod."""
+def widened_strains(
+    strain: np.ndarray, rest_strain: np.ndarray, filament: np.ndarray, curve: np.ndarray, out: np.ndarray
+) -> None:
+    """Write epsilon_s (n, 6) of all elements to out; strain, rest_strain (n, 6), filament (n, 9, 3), curve (n, 5): of the rod."""
     change = np.empty(6)
     for e in range(strain.shape[0]):
         widened(strain[e], rest_strain[e], filament[e], curve[e], out[e], change)
