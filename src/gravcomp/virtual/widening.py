@@ -7,8 +7,8 @@ and channels of a rod with the strain epsilon = (v, w) have the stretch that tho
     epsilon_s = (v + (1 - s) w x c, s w),    s = s(stretch of the centroid)
 
 For a small bend of a bar under a finite stretch this is exact: with it M = s^2 (dP/de) I w, which is the solution of the
-three-dimensional equations (A. E. Green, J. E. Adkins, Large Elastic Deformations, 1970, chapter IV: small deformations
-superposed on a finite stretch). Material and cables take epsilon_s, which is their own strain; forces follow from its energy:
+three-dimensional equations (A. E. Green, W. Zerna, Theoretical Elasticity, 1968, chapter IV: small deformations superposed on
+finite deformation). Material and cables take epsilon_s, which is their own strain; forces follow from its energy:
 
     sigma = J^T sigma_s,    K = J^T K_s J + sum_i sigma_s,i d^2 epsilon_s,i,    J = d epsilon_s / d epsilon
 
@@ -16,14 +16,14 @@ Because s multiplies w, a bent section resists its stretch by M w s'/s: a cable 
 which stretches it. Ends that hold the section in its width are not regarded: they do so over about half the width.
 
 In a bent section every filament contracts by its own stretch. With eta = kappa y its strain, zeta = kappa x, it moves by
-a kappa (y^2 - x^2) / 2 across (anticlastic bending; A. E. H. Love, Mathematical Theory of Elasticity, section 88) and so
+a kappa (y^2 - x^2) / 2 across (anticlastic bending; A. E. H. Love, The Mathematical Theory of Elasticity, 1927, chapter V) and so
 is stretched by delta = a (eta^2 - zeta^2 - mean) / 2 more. Of second order in the curvature, this gives the energy
 
     U_a = E c int eta^2 delta dA,    c: of the law's curve
 
-It softens the bending of St. Venant-Kirchhoff's law and stiffens that of the others, by 4/3 c a (eta^2 mean at the outer fibre's
-size); the terms without c, which are those of linear elasticity in a section that becomes oval, cancel each other to a fifth of
-that in thick tubes, and are not regarded: thin ones buckle by them (Brazier). So that U_a never outweighs the linear energy at
+It changes the stiffness in bending by the share 4/3 c a int eta^4 dA / int eta^2 dA in a round section: St. Venant-Kirchhoff's
+law becomes softer, the others stiffer. Terms of the same order without c, of a section that becomes oval, are not regarded: in
+a tube of 9/3.6 mm they are a fifth of that; thin tubes buckle by them (Brazier). So that U_a never outweighs the linear energy at
 any curvature, it is divided by 1 + _BOUND |c a| (eta^2 mean).
 """
 
