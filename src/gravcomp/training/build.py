@@ -16,6 +16,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.full_model.symmetry import symmetries
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError
@@ -27,6 +28,7 @@ from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.training.images import with_images
 from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
@@ -104,6 +106,7 @@ def trained(
     most_modes = modes + (options.more_modes if exact else 0)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    maps = symmetries(model)
 
     def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
         """Return whether the modes (n, r) represent the share `most` of the samples."""
@@ -118,11 +121,15 @@ def trained(
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
+        earlier = with_images(earlier, maps)
         if len(earlier) < most_modes or not new:
             return False
-        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(basis_of(earlier + new), new, _MOST_NEW)
+        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(
+            basis_of(earlier + with_images(new, maps)), new, _MOST_NEW
+        )
 
-    found = samples(model, options.training, lambda share: progress("training", share), kept, enough)
+    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, 1 + len(maps))
+    found = with_images(computed, maps)
     if len(found) < modes:
         raise MeshError(
             f"only {len(found)} equilibria were found for the training, at least {modes} are needed;"
@@ -151,7 +158,7 @@ def trained(
         modulus=modulus,
         modulus_low=low * modulus,
         modulus_high=high * modulus,
-        samples=len(found),
+        samples=len(computed),
         error_median=np.nan,
         error_worst=np.nan,
     )
