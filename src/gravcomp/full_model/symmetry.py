@@ -11,9 +11,8 @@ import numpy as np
 
 from gravcomp.description import Cable
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.wrench import Wrench
 
-# Of the length: how near a node's image lies to a node, how far the test's displacement goes along the robot, and at single nodes.
+# Of the length: how near a node's image lies to a node, how far the test's displacement goes along the robot, and at one node.
 _NEAR, _MOVED, _SHAKEN = 1e-7, 0.05, 1e-5
 # Of the largest force, weight and change of length: differences that are rounding.
 _SAME = 1e-7
@@ -46,11 +45,6 @@ class Symmetry:
         image = np.empty_like(values)
         image[self.cables] = values
         return image
-
-    def of_wrench(self, wrench: Wrench) -> Wrench:
-        """Return the image of a load: a mirror turns a moment the other way round."""
-        handed = np.linalg.det(self.matrix)
-        return Wrench(self.matrix @ wrench.force, handed * (self.matrix @ wrench.moment), wrench.station)
 
 
 def symmetries(model: MeshedModel) -> list[Symmetry]:

@@ -36,6 +36,8 @@ _MARGIN = 1.3
 # The share of new shapes that the modes have to represent, without the few near the end of the equilibria. And the share of the
 # trained shapes.
 _MOST_NEW, _MOST_TRAINED = 0.95, 0.98
+# Times what is wanted: trained shapes that the modes leave out by so much have an error at which the full model is used.
+_USELESS = 5.0
 
 
 @dataclass(frozen=True)
@@ -43,16 +45,18 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
-    they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
-    addition to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose
-    the cubature of the law's deviation with, cubature its tolerance; from `points` up to `board_points`, for which the board has
-    room, twice the tolerance is enough; represented: the training ends when the modes of earlier paths represent new ones to this
-    part of the length; training and test: motions to train and to test with.
+    they do not represent, if its law takes no points, so that a step has time for them; soft_modes: in turn, for a law with
+    points, where the modes leave so much that the reduced model would hardly ever be right: a longer step is the lesser evil;
+    strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to decompose;
+    integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from `points` up to
+    `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends when the modes of
+    earlier paths represent new ones to this part of the length; training and test: motions to train and to test with.
     """
 
     modes: int = 44
     loaded_modes: int = 12
     more_modes: int = 12
+    soft_modes: tuple[int, ...] = (28, 56)
     strains: int = 36
     decomposed: int = 1100
     integrated: int = 150
@@ -104,29 +108,34 @@ def trained(
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
     most_modes = modes + (options.more_modes if exact else 0)
+    largest = modes + (options.more_modes if exact else max(options.soft_modes, default=0))
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
 
-    def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
-        """Return whether the modes (n, r) represent the share `most` of the samples."""
+    def represent(basis: np.ndarray, some: list[Sample], most: float, times: float = 1.0) -> bool:
+        """Return whether the modes (n, r) represent the share `most` of the samples, to `times` what is wanted."""
         shapes = _shapes(some).T
         missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
         apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
-        return bool(np.quantile(apart, most) <= options.represented)
+        return bool(np.quantile(apart, most) <= times * options.represented)
 
-    def basis_of(some: list[Sample]) -> np.ndarray:
-        """Return as many modes (n, r) of the samples as the robot may have."""
-        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, most_modes)
+    def basis_of(some: list[Sample], count: int) -> np.ndarray:
+        """Return modes (n, count) of the samples."""
+        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, count)
+
+    def soft(some: list[Sample]) -> bool:
+        """Return whether the usual modes leave so much of the samples that more are needed in spite of the law's points."""
+        return not exact and not represent(basis_of(some, modes), some, _MOST_TRAINED, _USELESS)
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
         earlier = with_images(earlier, maps)
-        if len(earlier) < most_modes or not new:
+        every = earlier + with_images(new, maps)
+        count = largest if soft(every) else most_modes
+        if len(earlier) < count or not new:
             return False
-        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(
-            basis_of(earlier + with_images(new, maps)), new, _MOST_NEW
-        )
+        return represent(basis_of(earlier, count), new, _MOST_NEW) or not represent(basis_of(every, count), new, _MOST_NEW)
 
     computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, 1 + len(maps))
     found = with_images(computed, maps)
@@ -137,9 +146,11 @@ def trained(
         )
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
-    basis = energy_basis(shapes, matrix.multiply, modes)
-    if exact and not represent(basis, found, _MOST_TRAINED):
-        basis = energy_basis(shapes, matrix.multiply, most_modes)
+    more = [options.more_modes] if exact else options.soft_modes if soft(found) else []
+    for count in (modes, *(modes + further for further in more)):
+        basis = energy_basis(shapes, matrix.multiply, count)
+        if represent(basis, found, _MOST_TRAINED):
+            break
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
     low, high = options.training.modulus_range

@@ -10,8 +10,8 @@ and fall along the path up to its `max_wrench`.
 A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop, and gravity
 turns by half as much from where there was one; a path on which that does not help is at its end, as a search from the straight
 robot takes longer than all steps of a path. Where the robot moves far, gravity turns by less in the first place, because a step
-that is lost takes as long as four that are not. For the same reason a path whose first shape one search does not find begins with the
-hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
+that is lost takes as long as four that are not. For the same reason a path whose first shape one search does not find begins with
+the hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
 would sink when it stands upright is held on the way.
 """
 
@@ -70,8 +70,8 @@ class TrainingOptions:
     seed: int = 1
 
 
-# After so many paths it is asked again whether they are enough. Of a robot with images fewer are needed, but not fewer than these:
-# they have to contain all kinds of paths.
+# After so many paths it is asked again whether they are enough. Of a robot with images fewer are needed, but these at least: they
+# have to contain all kinds of paths.
 _NEW = 10
 _LEAST_NEW, _LEAST_WITH_IMAGES = 4, 8
 _ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
