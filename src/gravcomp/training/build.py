@@ -137,7 +137,8 @@ def trained(
             return False
         return represent(basis_of(earlier, count), new, _MOST_NEW) or not represent(basis_of(every, count), new, _MOST_NEW)
 
-    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, 1 + len(maps))
+    images = 1 + len(maps)
+    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, images=images)
     found = with_images(computed, maps)
     if len(found) < modes:
         raise MeshError(
