@@ -107,8 +107,8 @@ def trained(
         raise MeshError(reason)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
-    most_modes = modes + (options.more_modes if exact else 0)
-    largest = modes + (options.more_modes if exact else max(options.soft_modes, default=0))
+    further = (options.more_modes,) if exact else options.soft_modes
+    largest = modes + max(further, default=0)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
@@ -120,22 +120,25 @@ def trained(
         apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
         return bool(np.quantile(apart, most) <= times * options.represented)
 
-    def basis_of(some: list[Sample], count: int) -> np.ndarray:
-        """Return modes (n, count) of the samples."""
-        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, count)
+    def modes_of(some: list[Sample]) -> np.ndarray:
+        """Return as many modes (n, r) of the samples as a robot may have at all, the most important ones first."""
+        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, largest)
 
-    def soft(some: list[Sample]) -> bool:
-        """Return whether the usual modes leave so much of the samples that more are needed in spite of the law's points."""
-        return not exact and not represent(basis_of(some, modes), some, _MOST_TRAINED, _USELESS)
+    def most_of(basis: np.ndarray, some: list[Sample]) -> int:
+        """Return how many of the modes (n, r) a robot with these samples may have: with points, all only if it is soft."""
+        return largest if exact or not represent(basis[:, :modes], some, _MOST_TRAINED, _USELESS) else modes
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
         earlier = with_images(earlier, maps)
-        every = earlier + with_images(new, maps)
-        count = largest if soft(every) else most_modes
-        if len(earlier) < count or not new:
+        if len(earlier) < modes or not new:
             return False
-        return represent(basis_of(earlier, count), new, _MOST_NEW) or not represent(basis_of(every, count), new, _MOST_NEW)
+        every = earlier + with_images(new, maps)
+        of_all = modes_of(every)
+        most = most_of(of_all, every)
+        if len(earlier) < most:
+            return False
+        return represent(modes_of(earlier)[:, :most], new, _MOST_NEW) or not represent(of_all[:, :most], new, _MOST_NEW)
 
     images = 1 + len(maps)
     computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, images=images)
@@ -147,11 +150,11 @@ def trained(
         )
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
-    more = [options.more_modes] if exact else options.soft_modes if soft(found) else []
-    for count in (modes, *(modes + further for further in more)):
-        basis = energy_basis(shapes, matrix.multiply, count)
-        if represent(basis, found, _MOST_TRAINED):
-            break
+    whole = energy_basis(shapes, matrix.multiply, largest)
+    most = most_of(whole, found)
+    counts = [count for count in (modes, *(modes + more for more in further)) if count <= most]
+    fitting = (count for count in counts if represent(whole[:, :count], found, _MOST_TRAINED))
+    basis = np.ascontiguousarray(whole[:, : next(fitting, most)])
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
     low, high = options.training.modulus_range
