@@ -47,10 +47,11 @@ class BuildOptions:
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
     they do not represent, if its law takes no points, so that a step has time for them; soft_modes: in turn, for a law with
     points, where the modes leave so much that the reduced model would hardly ever be right: a longer step is the lesser evil;
-    strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to decompose;
-    integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from `points` up to
-    `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends when the modes of
-    earlier paths represent new ones to this part of the length; training and test: motions to train and to test with.
+    strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to decompose,
+    strained: and to find the principal strains in; integrated: number of shapes to choose the cubature of the law's deviation
+    with, cubature its tolerance; from `points` up to `board_points`, for which the board has room, twice the tolerance is enough;
+    represented: the training ends when the modes of earlier paths represent new ones to this part of the length; training and
+    test: motions to train and to test with.
     """
 
     modes: int = 44
@@ -59,6 +60,7 @@ class BuildOptions:
     soft_modes: tuple[int, ...] = (28, 56)
     strains: int = 36
     decomposed: int = 1100
+    strained: int = 500
     integrated: int = 150
     cubature: float = 1.5e-4
     points: int = 120
@@ -156,7 +158,7 @@ def trained(
     fitting = (count for count in counts if represent(whole[:, :count], found, _MOST_TRAINED))
     basis = np.ascontiguousarray(whole[:, : next(fitting, most)])
     progress("integrating", 0.0)
-    elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
+    elasticity = strain_polynomials(model.elements, basis, evenly(shapes, options.strained), options.strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
     coordinates = _shapes(found) @ matrix.multiply(basis)
