@@ -18,7 +18,6 @@ from gravcomp.training.build import alone
 SMALL = BuildOptions(
     modes=30,
     more_modes=0,
-    soft_modes=(),
     strains=24,
     training=TrainingOptions(paths=36, steps=6, bend=0.3),
     test=TrainingOptions(paths=2, steps=4, bend=0.3, seed=1000),

@@ -221,14 +221,16 @@ def test_a_path_begins_with_the_hanging_robot_where_one_search_finds_no_equilibr
     assert (np.diff(turned) < 0.0).all() and (np.diff(turned) > -30.1).all()  # on its way, in steps
 
 
-@pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 9), ("neo_hookean", 1.0, 4)])
-def test_there_are_more_modes_where_the_others_do_not_represent_the_shapes(robot, monkeypatch, law, represented, size):
+@pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 4)])
+def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_the_shapes(
+    robot, monkeypatch, law, represented, size
+):
     model = RobotModel(robot.with_material(law=law))
     shapes = 1e-4 * model.length * np.random.default_rng(0).normal(size=(12, 3 * model.n_free))
     none = np.zeros(model.tendons.count)
     found = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
-    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args, **images: found)
-    options = BuildOptions(modes=4, more_modes=3, soft_modes=(3, 5), strains=2, represented=represented, integrated=2)
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args, **turns: found)
+    options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
     assert trained(model, options).basis.shape[1] == size
 
 
@@ -246,7 +248,7 @@ def test_the_training_ends_where_more_paths_would_not_help(robot, monkeypatch, e
         shapes = rng.normal(size=(14, len(of))) @ kinds[list(of)]
         return [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
 
-    def asking(*args, **images):
+    def asking(*args, **turns):
         asked.append(args[-1](found(earlier), found(new)))
         return found(new)
 

@@ -82,14 +82,14 @@ def test_a_flat_section_has_two_mirrors():
 
 def test_fewer_paths_are_followed_where_each_stands_for_its_images():
     model = RobotModel(tube(modulus=20e6))
-    options, asked = TrainingOptions(paths=14, least=25, steps=1), []
+    options, asked = TrainingOptions(paths=15, least=25, steps=1), []
 
     def enough(earlier: list, new: list) -> bool:
         asked.append((len(earlier), len(new)))
         return len(asked) == 2
 
-    assert len(samples(model, options, enough=enough, images=6)) == 12
-    assert asked == [(4, 4), (8, 4)]
+    assert len(samples(model, options, enough=enough, turns=3)) == 13
+    assert asked == [(5, 4), (9, 4)]
 
 
 def test_gravity_turns_by_less_where_a_soft_robot_moves_far(monkeypatch):

@@ -36,8 +36,6 @@ _MARGIN = 1.3
 # The share of new shapes that the modes have to represent, without the few near the end of the equilibria. And the share of the
 # trained shapes.
 _MOST_NEW, _MOST_TRAINED = 0.95, 0.98
-# Times what is wanted: trained shapes that the modes leave out by so much have an error at which the full model is used.
-_USELESS = 5.0
 
 
 @dataclass(frozen=True)
@@ -45,19 +43,17 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
-    they do not represent, if its law takes no points, so that a step has time for them; soft_modes: in turn, for a law with
-    points, where the modes leave so much that the reduced model would hardly ever be right: a longer step is the lesser evil;
-    strains: number of principal strains in addition to those of the modes; decomposed: largest number of snapshots to decompose,
-    strained: and to find the principal strains in; integrated: number of shapes to choose the cubature of the law's deviation
-    with, cubature its tolerance; from `points` up to `board_points`, for which the board has room, twice the tolerance is enough;
-    represented: the training ends when the modes of earlier paths represent new ones to this part of the length; training and
-    test: motions to train and to test with.
+    they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
+    addition to those of the modes; decomposed: largest number of snapshots to decompose, strained: and to find the principal
+    strains in; integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from
+    `points` up to `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends
+    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to
+    test with.
     """
 
     modes: int = 44
     loaded_modes: int = 12
     more_modes: int = 12
-    soft_modes: tuple[int, ...] = (28, 56)
     strains: int = 36
     decomposed: int = 1100
     strained: int = 500
@@ -109,41 +105,32 @@ def trained(
         raise MeshError(reason)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
-    further = (options.more_modes,) if exact else options.soft_modes
-    largest = modes + max(further, default=0)
+    most_modes = modes + (options.more_modes if exact else 0)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
 
-    def represent(basis: np.ndarray, some: list[Sample], most: float, times: float = 1.0) -> bool:
-        """Return whether the modes (n, r) represent the share `most` of the samples, to `times` what is wanted."""
+    def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
+        """Return whether the modes (n, r) represent the share `most` of the samples."""
         shapes = _shapes(some).T
         missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
         apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
-        return bool(np.quantile(apart, most) <= times * options.represented)
+        return bool(np.quantile(apart, most) <= options.represented)
 
-    def modes_of(some: list[Sample]) -> np.ndarray:
-        """Return as many modes (n, r) of the samples as a robot may have at all, the most important ones first."""
-        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, largest)
-
-    def most_of(basis: np.ndarray, some: list[Sample]) -> int:
-        """Return how many of the modes (n, r) a robot with these samples may have: with points, all only if it is soft."""
-        return largest if exact or not represent(basis[:, :modes], some, _MOST_TRAINED, _USELESS) else modes
+    def basis_of(some: list[Sample]) -> np.ndarray:
+        """Return as many modes (n, r) of the samples as the robot may have, the most important ones first."""
+        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, most_modes)
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
         earlier = with_images(earlier, maps)
-        if len(earlier) < modes or not new:
+        if len(earlier) < most_modes or not new:
             return False
         every = earlier + with_images(new, maps)
-        of_all = modes_of(every)
-        most = most_of(of_all, every)
-        if len(earlier) < most:
-            return False
-        return represent(modes_of(earlier)[:, :most], new, _MOST_NEW) or not represent(of_all[:, :most], new, _MOST_NEW)
+        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(basis_of(every), new, _MOST_NEW)
 
-    images = 1 + len(maps)
-    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, images=images)
+    turns = 1 + sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in maps)
+    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, turns=turns)
     found = with_images(computed, maps)
     if len(found) < modes:
         raise MeshError(
@@ -152,11 +139,9 @@ def trained(
         )
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
-    whole = energy_basis(shapes, matrix.multiply, largest)
-    most = most_of(whole, found)
-    counts = [count for count in (modes, *(modes + more for more in further)) if count <= most]
-    fitting = (count for count in counts if represent(whole[:, :count], found, _MOST_TRAINED))
-    basis = np.ascontiguousarray(whole[:, : next(fitting, most)])
+    basis = energy_basis(shapes, matrix.multiply, most_modes)
+    if represent(basis[:, :modes], found, _MOST_TRAINED):
+        basis = np.ascontiguousarray(basis[:, :modes])
     progress("integrating", 0.0)
     elasticity = strain_polynomials(model.elements, basis, evenly(shapes, options.strained), options.strains)
     low, high = options.training.modulus_range

@@ -70,8 +70,8 @@ class TrainingOptions:
     seed: int = 1
 
 
-# After so many paths it is asked again whether they are enough. Of a robot with images fewer are needed, but these at least: they
-# have to contain all kinds of paths.
+# After so many paths it is asked again whether they are enough. Of a robot that turns map onto itself fewer are needed, but these
+# at least: they have to contain all kinds of paths.
 _NEW = 10
 _LEAST_NEW, _LEAST_WITH_IMAGES = 4, 8
 _ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
@@ -98,18 +98,19 @@ def samples(
     progress: Callable[[float], None] = lambda share: None,
     kept: Path | None = None,
     enough: Callable[[list[Sample], list[Sample]], bool] | None = None,
-    images: int = 1,
+    turns: int = 1,
 ) -> list[Sample]:
     """Return equilibria along random paths. progress: called with the completed share.
 
     kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples. enough:
     asked every few paths with the samples of earlier paths and those of the last ones, whether they are enough; None: all paths.
-    images: for how many each sample stands, with those that symmetries make of it; it is asked after so many fewer paths.
+    turns: that map the robot onto itself; it is asked after so many fewer paths, as their images are known. Those of a mirror
+    are, too, but do not stand for paths: they bend in few other directions.
     """
     rng = np.random.default_rng(options.seed)
     new, least = _NEW, options.least
-    if images > 1:
-        new, least = max(_LEAST_NEW, -(-_NEW // images)), min(least, max(_LEAST_WITH_IMAGES, -(-least // images)))
+    if turns > 1:
+        new, least = max(_LEAST_NEW, -(-_NEW // turns)), min(least, max(_LEAST_WITH_IMAGES, -(-least // turns)))
     found: list[Sample] = []
     begins: list[int] = []  # of each path, in `found`
     for number in range(options.paths):
