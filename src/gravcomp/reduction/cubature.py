@@ -132,7 +132,7 @@ class _ActiveSet:
     """The columns with positive weights of a non-negative least squares problem with columns of length 1.
 
     The Cholesky factor of their Gram matrix grows by a row with each column, so that a column costs a solution and not a new
-    decomposition; only where columns leave, the factor is made anew.
+    decomposition; only where columns leave, the factor is made again.
     """
 
     def __init__(self, gram: np.ndarray, products: np.ndarray):
@@ -190,7 +190,7 @@ class _ActiveSet:
             self._keep(np.array(self._index)[stays], int(np.argmin(stays)))
 
     def _keep(self, index: np.ndarray, same: int) -> None:
-        """Factor anew with some of the columns, which are independent of one another; the first `same` are where they were."""
+        """Factor again with some of the columns, which are independent of one another; the first `same` are where they were."""
         k = len(index)
         self._index = [int(column) for column in index]
         self._dependent[:] = False
