@@ -32,7 +32,7 @@ from gravcomp.holdability.directions import angles, sphere
 from gravcomp.holdability.motor_tension import weak_motors
 from gravcomp.holdability.play import play_of
 from gravcomp.holdability.search import HoldSearch
-from gravcomp.holdability.symmetry import symmetries, turns
+from gravcomp.holdability.symmetry import symmetries, symmetries_of, turns
 from gravcomp.holdability.text import lines, sentence
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.inverse.rest_target import rest_target
@@ -194,6 +194,23 @@ def test_an_answer_holds_for_all_directions_that_turns_and_mirrors_of_the_robot_
 def test_a_robot_that_is_not_the_same_from_every_side_has_fewer_symmetries(change, number):
     robot = dataclasses.replace(arm(), **change)
     assert len(symmetries(robot, rest_target(robot))) == number
+
+
+def test_a_robot_that_is_not_round_has_the_symmetries_of_its_mesh():
+    material = Material(youngs_modulus=_MODULUS, poissons_ratio=0.4, density=_DENSITY)
+    flat = Segment("s", length=_LENGTH, section=Section("ellipse", 1.5 * _DIAMETER, _DIAMETER), material=material)
+    model = RobotModel(dataclasses.replace(arm(angles_deg=(0, 90, 180, 270)), segments=(flat,)))
+    found = symmetries_of(model, rest_target(model.robot))
+    assert len(found) == 4 and turns(found) == 2
+    search = HoldSearch(model)
+    assert len(search.symmetries) == 4
+    one = search.answer(np.array([-0.6, 0.64, 0.48]))
+    for symmetry in found[1:]:
+        image, own = symmetry.of(one), search.answer(symmetry.of(one).direction)
+        assert (image.held, image.binding, image.cable) == (own.held, own.binding, own.cable)
+        assert image.demand == pytest.approx(own.demand, rel=0.01)
+    bent = symmetries_of(model, rest_target(model.robot, 0.3, 0.0))
+    assert len(bent) == 2 and np.allclose(bent[1].matrix, np.diag([1.0, -1.0, 1.0]))  # the mirror that the bend keeps
 
 
 def test_a_target_off_the_axis_has_no_symmetries():

@@ -229,7 +229,7 @@ def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_
     shapes = 1e-4 * model.length * np.random.default_rng(0).normal(size=(12, 3 * model.n_free))
     none = np.zeros(model.tendons.count)
     found = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
-    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args: found)
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args, **turns: found)
     options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
     assert trained(model, options).basis.shape[1] == size
 
@@ -248,11 +248,12 @@ def test_the_training_ends_where_more_paths_would_not_help(robot, monkeypatch, e
         shapes = rng.normal(size=(14, len(of))) @ kinds[list(of)]
         return [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
 
-    def asking(*args):
+    def asking(*args, **turns):
         asked.append(args[-1](found(earlier), found(new)))
         return found(new)
 
     monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", asking)
+    monkeypatch.setattr(sys.modules["gravcomp.training.build"], "symmetries", lambda model: [])
     trained(model, BuildOptions(modes=4, more_modes=3, strains=2, represented=1e-6, integrated=2))
     assert asked == [ends]
 

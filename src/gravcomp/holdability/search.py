@@ -9,7 +9,7 @@ from gravcomp.holdability.limits import unlimited_rates
 from gravcomp.holdability.linear import LinearHolding
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.path import HoldPath, PathPoint
-from gravcomp.holdability.symmetry import symmetries
+from gravcomp.holdability.symmetry import symmetries_of
 from gravcomp.inverse.rest_target import rest_target
 from gravcomp.inverse.target import Target
 from gravcomp.standard_gravity import STANDARD_GRAVITY
@@ -36,7 +36,7 @@ class HoldSearch:
         self.wide = unlimited_rates(self.robot.limits, self.options.beyond)
         self.linear = LinearHolding(model, self.path.linear_answer, self.wide)
         self.tolerance = self.options.tolerance * model.length
-        self.symmetries = symmetries(self.robot, self.target)
+        self.symmetries = symmetries_of(model, self.target)
 
     def linear_demand(self, direction: np.ndarray) -> float:
         """Return the demand of the linear estimate for a direction (3,); beyond the wider limits where these do not hold it."""

@@ -1,6 +1,8 @@
 """Turns and mirrors about the axis that map a robot onto itself: with them an answer holds for several directions of gravity.
 
 A robot with round sections and three equal cables at equal angles has six of them: a sixth of the sphere tells the whole of it.
+They follow from its description, whatever its mesh. Those of other bodies are those of their meshes: a flat or elliptic one with
+four cables has four.
 """
 
 import dataclasses
@@ -9,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gravcomp.description import Cable, Robot
+from gravcomp.full_model import symmetry as of_model
+from gravcomp.full_model.model import MeshedModel
 from gravcomp.holdability.answer import DirectionAnswer
 from gravcomp.inverse.target import Target
 
@@ -49,6 +53,20 @@ def symmetries(robot: Robot, target: Target) -> list[Symmetry]:
     return found
 
 
+def symmetries_of(model: MeshedModel, target: Target) -> list[Symmetry]:
+    """Return the symmetries of a robot with this target for its tip, of one that is not round those of its mesh."""
+    robot = model.robot
+    if _round(robot):
+        return symmetries(robot, target)
+    names = robot.cable_names
+    found = [Symmetry(np.eye(3), {name: name for name in names})]
+    for symmetry in of_model.symmetries(model):
+        if _stays(robot, target, symmetry.matrix):
+            images = {name: names[there] for name, there in zip(names, symmetry.cables)}
+            found.append(Symmetry(symmetry.matrix, images))
+    return found
+
+
 def turns(found: list[Symmetry]) -> int:
     """Return the number of turns among the symmetries, 1 for the identity alone."""
     return sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in found)
@@ -75,6 +93,12 @@ def _round(robot: Robot) -> bool:
     ]
     plain = all(segment.rest is None and segment.material.fibres is None for segment in robot.segments)
     return plain and all(outline.round for outline in outlines)
+
+
+def _stays(robot: Robot, target: Target, matrix: np.ndarray) -> bool:
+    """Whether a matrix (3, 3) maps the target onto itself."""
+    places = np.vstack([target.tip_position / robot.length, target.direction_or_zeros, target.backbone_position / robot.length])
+    return bool((np.abs(places @ matrix.T - places) < _SAME).all())
 
 
 def _on_axis(robot: Robot, target: Target) -> bool:

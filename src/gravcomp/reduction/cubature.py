@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.linalg import solve_triangular
 
 from gravcomp.mechanics.kinematics import green_strain
 from gravcomp.mechanics.total_lagrangian import SolidElements
@@ -30,6 +31,8 @@ from gravcomp.rounding import REORDERED
 # Largest number of points to choose from (a larger body offers a random part of its points), and of points at once.
 _CANDIDATES, _AT_ONCE = 3000, 200
 _ROUNDING = 1e-14
+# The square of a column's part across the others, over its own, below which it depends on them.
+_DEPENDENT = 1e-12
 # beta as a fraction of the root of the trace of the sections' part.
 _OTHERS = 0.1
 
@@ -108,39 +111,114 @@ def sparse_weights(
     they leave at most twice as much.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    weights = np.zeros(len(products))
-    active = np.zeros(len(products), dtype=bool)
+    active = _ActiveSet(gram / np.outer(scale, scale), products / scale)
     left = np.sqrt(square)
     for _ in range(3 * len(products)):
         if left <= max(allowed, 1e-7 * np.sqrt(square)):
             break
-        if enough[0] <= active.sum() <= enough[1] and left <= 2.0 * allowed:
+        if enough[0] <= active.count <= enough[1] and left <= 2.0 * allowed:
             break
-        index = np.flatnonzero(active)
-        gain = np.where(active, -np.inf, (products - weights[index] @ gram[index]) / scale)  # gram is symmetric
+        gain = active.gain()
         best = int(np.argmax(gain))
         if gain[best] <= _ROUNDING * np.sqrt(square):
             break
-        active[best] = True
+        active.add(best)
+        left = np.sqrt(max(0.0, square - active.explained))
+    index, weights = active.weights()
+    return index, weights / scale[index], float(left)
+
+
+class _ActiveSet:
+    """The columns with positive weights of a non-negative least squares problem with columns of length 1.
+
+    The Cholesky factor of their Gram matrix grows by a row with each column, so that a column costs a solution and not a new
+    decomposition; only where columns leave, the factor is made again.
+    """
+
+    def __init__(self, gram: np.ndarray, products: np.ndarray):
+        """gram A^T A (c, c) and products A^T b (c,)."""
+        self._gram, self._products = gram, products
+        self._size = 64  # rows for which there is room
+        self._index: list[int] = []
+        self._lower, self._rows = np.zeros((self._size, self._size)), np.empty((self._size, len(products)))
+        self._forward = np.zeros(self._size)  # L^-1 A^T b
+        self._weights = np.zeros(0)
+        self._dependent = np.zeros(len(products), dtype=bool)  # columns that the active ones already make up
+
+    @property
+    def count(self) -> int:
+        """Number of columns."""
+        return len(self._index)
+
+    @property
+    def explained(self) -> float:
+        """Square of b's part that the columns represent."""
+        found = self._forward[: self.count]
+        return float(found @ found)
+
+    def weights(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return indices (p,), ascending, and weights (p,) of the columns."""
+        order = np.argsort(self._index)
+        return np.array(self._index, dtype=np.int64)[order], self._weights[order]
+
+    def gain(self) -> np.ndarray:
+        """Return by how much the error falls with a small weight of each column (c,), over it; none for those in use."""
+        gain = self._products - self._weights @ self._rows[: self.count]
+        gain[self._index] = -np.inf
+        gain[self._dependent] = -np.inf
+        return gain
+
+    def add(self, column: int) -> None:
+        """Take in a column, and leave out those that would have negative weights with it."""
+        if not self._appended(column):
+            self._dependent[column] = True
+            return
+        self._weights = np.append(self._weights, 0.0)
         while True:
-            index = np.flatnonzero(active)
-            block = gram[np.ix_(index, index)] / np.outer(scale[index], scale[index])
-            solved = np.linalg.lstsq(block, products[index] / scale[index], rcond=1e-12)[0] / scale[index]
-            if (solved > 0.0).all():
-                weights[:] = 0.0
-                weights[index] = solved
-                break
+            k = self.count
+            solved = solve_triangular(self._lower[:k, :k], self._forward[:k], lower=True, trans=1, check_finite=False)
+            falling = solved <= 0.0
+            if not falling.any():
+                self._weights = solved
+                return
             # Go toward the solution until the first weight is zero, and leave that column out.
-            before, falling = weights[index], solved <= 0.0
-            share = (before[falling] / (before[falling] - solved[falling])).min()
-            weights[index] = before + share * (solved - before)
-            active[index[falling & (weights[index] <= 1e-12 * weights.max())]] = False
-            weights[~active] = 0.0
-        index = np.flatnonzero(active)
-        found = weights[index]
-        left = np.sqrt(max(0.0, square - 2.0 * products[index] @ found + found @ gram[np.ix_(index, index)] @ found))
-    index = np.flatnonzero(weights)
-    return index, weights[index], float(left)
+            before = self._weights[falling]
+            share = (before / (before - solved[falling])).min()
+            moved = self._weights + share * (solved - self._weights)
+            stays = ~(falling & (moved <= 1e-12 * moved.max()))
+            self._weights = moved[stays]
+            self._keep(np.array(self._index)[stays], int(np.argmin(stays)))
+
+    def _keep(self, index: np.ndarray, same: int) -> None:
+        """Factor again with some of the columns, which are independent of one another; the first `same` are where they were."""
+        k = len(index)
+        self._index = [int(column) for column in index]
+        self._dependent[:] = False
+        self._rows[same:k] = self._gram[index[same:]]
+        self._lower[:k, :k] = np.linalg.cholesky(self._rows[:k][:, index])
+        self._forward[:k] = solve_triangular(self._lower[:k, :k], self._products[index], lower=True, check_finite=False)
+
+    def _appended(self, column: int) -> bool:
+        """Append a column to the factor; returns whether it is independent of the others."""
+        k = self.count
+        if k == self._size:
+            self._grow()
+        row = solve_triangular(self._lower[:k, :k], self._gram[self._index, column], lower=True, check_finite=False)
+        rest = self._gram[column, column] - row @ row
+        if rest <= _DEPENDENT:
+            return False
+        self._lower[k, :k], self._lower[k, k] = row, np.sqrt(rest)
+        self._forward[k] = (self._products[column] - row @ self._forward[:k]) / self._lower[k, k]
+        self._rows[k] = self._gram[column]
+        self._index.append(column)
+        return True
+
+    def _grow(self) -> None:
+        """Make room for twice as many columns."""
+        self._lower = np.pad(self._lower, (0, self._size))
+        self._rows = np.vstack([self._rows, np.empty_like(self._rows)])
+        self._forward = np.pad(self._forward, (0, self._size))
+        self._size *= 2
 
 
 def _constants(elements: SolidElements, element: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
+from gravcomp.full_model.symmetry import symmetries
 from gravcomp.full_model.wrench import PointLoads
 from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError
@@ -27,6 +28,7 @@ from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.training.images import with_images
 from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
@@ -42,10 +44,11 @@ class BuildOptions:
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
     they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
-    addition to those of the modes; decomposed: largest number of snapshots to decompose; integrated: number of shapes to choose
-    the cubature of the law's deviation with, cubature its tolerance; from `points` up to `board_points`, for which the board has
-    room, twice the tolerance is enough; represented: the training ends when the modes of earlier paths represent new ones to this
-    part of the length; training and test: motions to train and to test with.
+    addition to those of the modes; decomposed: largest number of snapshots to decompose, strained: and to find the principal
+    strains in; integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from
+    `points` up to `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends
+    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to
+    test with.
     """
 
     modes: int = 44
@@ -53,6 +56,7 @@ class BuildOptions:
     more_modes: int = 12
     strains: int = 36
     decomposed: int = 1100
+    strained: int = 500
     integrated: int = 150
     cubature: float = 1.5e-4
     points: int = 120
@@ -104,6 +108,7 @@ def trained(
     most_modes = modes + (options.more_modes if exact else 0)
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
+    maps = symmetries(model)
 
     def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
         """Return whether the modes (n, r) represent the share `most` of the samples."""
@@ -113,16 +118,20 @@ def trained(
         return bool(np.quantile(apart, most) <= options.represented)
 
     def basis_of(some: list[Sample]) -> np.ndarray:
-        """Return as many modes (n, r) of the samples as the robot may have."""
+        """Return as many modes (n, r) of the samples as the robot may have, the most important ones first."""
         return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, most_modes)
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
+        earlier = with_images(earlier, maps)
         if len(earlier) < most_modes or not new:
             return False
-        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(basis_of(earlier + new), new, _MOST_NEW)
+        every = earlier + with_images(new, maps)
+        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(basis_of(every), new, _MOST_NEW)
 
-    found = samples(model, options.training, lambda share: progress("training", share), kept, enough)
+    turns = 1 + sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in maps)
+    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, turns=turns)
+    found = with_images(computed, maps)
     if len(found) < modes:
         raise MeshError(
             f"only {len(found)} equilibria were found for the training, at least {modes} are needed;"
@@ -130,11 +139,11 @@ def trained(
         )
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
-    basis = energy_basis(shapes, matrix.multiply, modes)
-    if exact and not represent(basis, found, _MOST_TRAINED):
-        basis = energy_basis(shapes, matrix.multiply, most_modes)
+    basis = energy_basis(shapes, matrix.multiply, most_modes)
+    if represent(basis[:, :modes], found, _MOST_TRAINED):
+        basis = np.ascontiguousarray(basis[:, :modes])
     progress("integrating", 0.0)
-    elasticity = strain_polynomials(model.elements, basis, shapes, options.strains)
+    elasticity = strain_polynomials(model.elements, basis, evenly(shapes, options.strained), options.strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
     coordinates = _shapes(found) @ matrix.multiply(basis)
@@ -151,7 +160,7 @@ def trained(
         modulus=modulus,
         modulus_low=low * modulus,
         modulus_high=high * modulus,
-        samples=len(found),
+        samples=len(computed),
         error_median=np.nan,
         error_worst=np.nan,
     )

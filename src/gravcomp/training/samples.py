@@ -9,8 +9,9 @@ and fall along the path up to its `max_wrench`.
 
 A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop, and gravity
 turns by half as much from where there was one; a path on which that does not help is at its end, as a search from the straight
-robot takes longer than all steps of a path. For the same reason a path whose first shape one search does not find begins with the
-hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
+robot takes longer than all steps of a path. Where the robot moves far, gravity turns by less in the first place, because a step
+that is lost takes as long as four that are not. For the same reason a path whose first shape one search does not find begins with
+the hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
 would sink when it stands upright is held on the way.
 """
 
@@ -43,6 +44,8 @@ _TOLERANCE = 1e-5
 _LOST_STEPS = 3
 # After a step with an equilibrium the next one is longer by this factor; after one without, half as long.
 _GROWING = 1.4
+# How far a node should move in a step, over the length: Newton's method loses longer ones, after three times as many factors.
+_FARTHEST = 0.07
 # Largest turn of gravity in a step from the direction in which the robot hangs to the one that is wanted first. These steps do
 # not count: released robots would hardly leave the directions in which they hang.
 _TURN_AT_START = np.radians(30.0)
@@ -67,8 +70,10 @@ class TrainingOptions:
     seed: int = 1
 
 
-# After so many paths it is asked again whether they are enough.
+# After so many paths it is asked again whether they are enough. Of a robot that turns map onto itself fewer are needed, but these
+# at least: they have to contain all kinds of paths.
 _NEW = 10
+_LEAST_NEW, _LEAST_WITH_IMAGES = 4, 8
 _ARRAYS = ("unknowns", "gravity", "tension", "pulling", "load")
 
 
@@ -93,13 +98,19 @@ def samples(
     progress: Callable[[float], None] = lambda share: None,
     kept: Path | None = None,
     enough: Callable[[list[Sample], list[Sample]], bool] | None = None,
+    turns: int = 1,
 ) -> list[Sample]:
     """Return equilibria along random paths. progress: called with the completed share.
 
     kept: folder in which each path is stored, so that an interrupted run goes on from there and finds the same samples. enough:
-    asked every few paths with the samples of earlier paths and those of the last ones, whether more are needed; None: all paths.
+    asked every few paths with the samples of earlier paths and those of the last ones, whether they are enough; None: all paths.
+    turns: that map the robot onto itself; it is asked after so many fewer paths, as their images are known. Those of a mirror
+    are, too, but do not stand for paths: they bend in few other directions.
     """
     rng = np.random.default_rng(options.seed)
+    new, least = _NEW, options.least
+    if turns > 1:
+        new, least = max(_LEAST_NEW, -(-_NEW // turns)), min(least, max(_LEAST_WITH_IMAGES, -(-least // turns)))
     found: list[Sample] = []
     begins: list[int] = []  # of each path, in `found`
     for number in range(options.paths):
@@ -112,9 +123,9 @@ def samples(
         begins.append(len(found))
         found += path
         progress((number + 1) / options.paths)
-        more = number + 1 - options.least
-        if enough is not None and more >= 0 and more % _NEW == 0 and number + 1 > _NEW:
-            last = begins[-_NEW]
+        more = number + 1 - least
+        if enough is not None and more >= 0 and more % new == 0 and number + 1 > new:
+            last = begins[-new]
             if enough(found[:last], found[last:]):
                 progress(1.0)
                 break
@@ -162,13 +173,18 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     axis, left, turn = *_way(gravity, wanted), _TURN_AT_START
     steps = options.steps + int(np.ceil(left / turn))
     simulator.solver.extrapolates = True  # gravity turns evenly
+    before = model.free(simulator.solver.state.u).copy()
     for step in range(steps):
         load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / steps)), 1.0)
         shape = simulator.step(gravity, displacement, wrench=wrench_of(load))
         if shape.is_equilibrium:
-            lost, reached, part = 0, gravity, min(1.0, _GROWING * part)
-            left -= turned
             unknowns = model.free(simulator.displacements).copy()
+            if step:
+                moved = float(np.abs(unknowns - before).max()) / model.length
+                part = min(1.0, _GROWING * part, part * _FARTHEST / max(moved, 1e-3 * _FARTHEST))
+            before = unknowns
+            lost, reached = 0, gravity
+            left -= turned
             yield Sample(unknowns, gravity, shape.cable_tension.copy(), simulator.solver.sliding.direction, load)
         else:
             lost, part = lost + 1, 0.5 * part
