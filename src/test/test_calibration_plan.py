@@ -11,14 +11,16 @@ import pytest
 from gravcomp.calibration import planning, pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached, as_pulled
 from gravcomp.calibration.files import read_measured
+from gravcomp.calibration.force_length import length_rows
 from gravcomp.calibration.live import LiveSession, Phase
-from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.measured import MeasurementError, still_windows
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
 from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.pose_candidates import ORIENTATIONS
-from gravcomp.calibration.unknowns import Unknown
+from gravcomp.calibration.standstill import Standstill
+from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
@@ -230,6 +232,29 @@ def test_a_session_waits_for_the_base_and_goes_on_where_it_was(robot, tmp_path):
     other = dataclasses.replace(robot, cables=robot.cables[:2])
     with pytest.raises(MeasurementError, match="not of this robot"):
         LiveSession(other, session_plan(), out)
+
+
+def test_a_session_records_the_length_of_the_specific_force(robot, tmp_path):
+    """Empty where the IMU gives none; a file without the column is continued without it."""
+    out, plan = tmp_path / "live.csv", session_plan()
+    session = LiveSession(robot, plan, out)
+    now = run(session, 0.0, 0.0, 3.5)
+    session.on_force(now, np.array([np.nan, 0.0, 9.9]))
+    session.on_force(now, np.array([6.0, 0.0, 8.0]))
+    run(session, 0.0, now, 3.5)
+    measured = read_measured(out, robot.cable_names)
+    length, told = measured.specific_force, (measured.time >= now) & (measured.time < now + 1.01)
+    assert session.finished == 2 and told.sum() > 20 and length[told] == pytest.approx(10.0)
+    assert np.isnan(length[~told]).all()  # before it came, and when the IMU has been silent for a second
+    windows = still_windows(measured, Standstill.of(robot, 0.3))
+    assert np.isnan(windows.specific_force[0]) and windows.specific_force[1] == pytest.approx(10.0)
+    bias = [Unknown("bias", (axis,), 0.05) for axis in range(3)]
+    assert len(length_rows(windows, bias, np.eye(3), Priors())[0]) == 1
+    rows = [line.rsplit(",", 1)[0] for line in out.read_text(encoding="utf-8").splitlines()]
+    out.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    earlier = LiveSession(robot, plan, out)
+    run(earlier, 1.0, 20.0, 3.5)
+    assert earlier.phase == Phase.DONE and read_measured(out, robot.cable_names).specific_force is None
 
 
 def test_a_base_that_leaves_its_pose_begins_it_again(robot, tmp_path):

@@ -1,5 +1,6 @@
 """Measured courses of the tip, and the windows in them in which the robot is at rest."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,15 +23,17 @@ class Measured:
     displacement: np.ndarray  # (t, m), NaN: released
     tip_position: np.ndarray  # (t, 3)
     tip_direction: np.ndarray | None = None  # (t, 3)
-    specific_force: np.ndarray | None = None  # (t,) m/s^2, its length by the IMU; None: not measured
+    specific_force: np.ndarray | None = None  # (t,) m/s^2, its length by the IMU, NaN: not measured; None: never
 
     def __post_init__(self) -> None:
-        for name in ("time", "gravity", "tip_position", "tip_direction", "specific_force"):
+        for name in ("time", "gravity", "tip_position", "tip_direction"):
             values = getattr(self, name)
             if values is not None and not np.isfinite(values).all():
                 raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
-        if np.isinf(self.displacement).any():
-            raise MeasurementError(f"{self.source}: displacement has values that are infinite")
+        for name in ("displacement", "specific_force"):
+            values = getattr(self, name)
+            if values is not None and np.isinf(values).any():
+                raise MeasurementError(f"{self.source}: {name} has values that are infinite")
         if len(self.time) < 2:
             raise MeasurementError(f"{self.source}: has {len(self.time)} samples; at least 2 are needed")
         back = np.flatnonzero((np.diff(self.time) <= 0.0) & (np.diff(self.trial) == 0))
@@ -86,7 +89,7 @@ class StillWindows:
     tip_direction: np.ndarray | None = None  # (k, 3), of length 1; None: not measured
     history: History | None = None  # None: every window is relaxed
     share: np.ndarray | None = None  # (k,): one over the number of windows of the same rest; None: one each
-    specific_force: np.ndarray | None = None  # (k,) m/s^2, its length by the IMU; None: not measured
+    specific_force: np.ndarray | None = None  # (k,) m/s^2, its length by the IMU, NaN: not measured; None: never
 
     @property
     def shares(self) -> np.ndarray:
@@ -110,7 +113,7 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             for rows in pieces:
                 window = trial.rows(rows)
                 direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
-                force = np.nan if window.specific_force is None else window.specific_force.mean()
+                force = _mean_of_measured(window.specific_force)
                 found.append(
                     (
                         *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
@@ -191,6 +194,12 @@ def _is_still(window: Measured, still: Standstill, limit: float) -> bool:
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     turned = np.ptp(direction, axis=0).max() <= still.gravity
     return bool(spread and same and cables and turned)
+
+
+def _mean_of_measured(values: np.ndarray | None) -> float:
+    """Return the mean of the values that are not NaN; NaN: there are none."""
+    known = np.zeros(0) if values is None else values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
 
 
 def rms_distance(error: np.ndarray) -> float:
