@@ -13,6 +13,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import OK, WARN
 from rclpy.task import Future
+from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
 from gravcomp.calibration.approach import as_pulled
@@ -62,6 +63,7 @@ class Calibrator(ManagedNode):
             self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR),
             self.create_subscription(CableState, "cable/state", self._on_state, SENSOR),
             self.create_subscription(PoseStamped, self.parameters.tip_topic, self._on_tip, SENSOR),
+            self.create_subscription(Imu, "imu/data", self._on_imu, SENSOR),
         ]
         self._watch = self.create_timer(_PERIOD, self._show)
 
@@ -92,6 +94,10 @@ class Calibrator(ManagedNode):
             command.tension = [] if pose is None or self._session.phase == Phase.TURN else pose.tension.tolist()
             command.header.stamp = message.header.stamp
             self._command.publish(command)
+
+    def _on_imu(self, message: Imu) -> None:
+        if message.linear_acceleration_covariance[0] >= 0.0:  # -1: it measures none (sensor_msgs/Imu)
+            self._session.on_force(seconds(message.header), vector_of(message.linear_acceleration))
 
     def _on_tip(self, message: PoseStamped) -> None:
         time = seconds(message.header)

@@ -12,8 +12,10 @@ from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_fem.calibrator import Calibrator
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.time import Time
+from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
+from gravcomp.calibration.files import read_measured
 from gravcomp.calibration.plan import Plan, PlannedPose, gravity_of
 from gravcomp.calibration.plan_file import save_plan
 from gravcomp_msgs.msg import CableCommand, CableState
@@ -46,6 +48,7 @@ class Stand:
         self.gravity = self.other.create_publisher(Vector3Stamped, "gravity", SENSOR)
         self.state = self.other.create_publisher(CableState, "cable/state", SENSOR)
         self.tip = self.other.create_publisher(PoseStamped, "measured/tip", SENSOR)
+        self.imu = self.other.create_publisher(Imu, "imu/data", SENSOR)
         for node in (self.calibrator, self.other):
             self.executor.add_node(node)
         self.calibrator.start()
@@ -62,7 +65,10 @@ class Stand:
         gravity, tip = Vector3Stamped(), PoseStamped()
         gravity.vector.x, gravity.vector.y, gravity.vector.z = gravity_of(0.0, 0.0)
         tip.pose.position.z = 0.1
-        gravity.header.stamp = tip.header.stamp = stamp
+        imu = Imu()
+        imu.linear_acceleration.x, imu.linear_acceleration.z = 6.0, 7.0
+        gravity.header.stamp = tip.header.stamp = imu.header.stamp = stamp
+        self.imu.publish(imu)
         self.state.publish(CableState(displacement=[0.0] * 6))
         self.gravity.publish(gravity)
         self.tip.publish(tip)
@@ -95,3 +101,4 @@ def test_the_cables_wait_for_the_controllers_answer(stand):
     stand.until(lambda: stand.calibrator.finished, "it does not end")
     assert np.abs(stand.heard[-1] - PULL).max() < 1e-6
     assert stand.out.read_text(encoding="utf-8").startswith("pose,trial,time_s")
+    assert read_measured(stand.out, stand.calibrator.robot_file.robot.cable_names).specific_force[-1] == pytest.approx(9.2195)

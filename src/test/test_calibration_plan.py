@@ -11,14 +11,18 @@ import pytest
 from gravcomp.calibration import planning, pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached, as_pulled
 from gravcomp.calibration.files import read_measured
+from gravcomp.calibration.fit import fit_statics
+from gravcomp.calibration.force_length import length_rows
 from gravcomp.calibration.live import LiveSession, Phase
-from gravcomp.calibration.measured import MeasurementError
+from gravcomp.calibration.measured import MeasurementError, still_windows
+from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
 from gravcomp.calibration.planning import make_plan
 from gravcomp.calibration.pose_candidates import ORIENTATIONS
-from gravcomp.calibration.unknowns import Unknown
+from gravcomp.calibration.standstill import Standstill
+from gravcomp.calibration.unknowns import Priors, Unknown
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import Cable, Elements, Limits, Material, Robot, Segment, load_robot_file
@@ -28,7 +32,7 @@ from gravcomp.mesh.body import body_mesh
 from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.mesh.tube import coarse_elements
 from gravcomp.trials.calibration_run import run_plan
-from gravcomp.trials.coverage import RARE, counted, coverage
+from gravcomp.trials.coverage import RARE, LinearRobot, counted, coverage
 
 PERIOD = 0.3  # s
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -232,6 +236,29 @@ def test_a_session_waits_for_the_base_and_goes_on_where_it_was(robot, tmp_path):
         LiveSession(other, session_plan(), out)
 
 
+def test_a_session_records_the_length_of_the_specific_force(robot, tmp_path):
+    """Empty where the IMU gives none; a file without the column is continued without it."""
+    out, plan = tmp_path / "live.csv", session_plan()
+    session = LiveSession(robot, plan, out)
+    now = run(session, 0.0, 0.0, 3.5)
+    session.on_force(now, np.array([np.nan, 0.0, 9.9]))
+    session.on_force(now, np.array([6.0, 0.0, 8.0]))
+    run(session, 0.0, now, 3.5)
+    measured = read_measured(out, robot.cable_names)
+    length, told = measured.specific_force, (measured.time >= now) & (measured.time < now + 1.01)
+    assert session.finished == 2 and told.sum() > 20 and length[told] == pytest.approx(10.0)
+    assert np.isnan(length[~told]).all()  # before it came, and when the IMU has been silent for a second
+    windows = still_windows(measured, Standstill.of(robot, 0.3))
+    assert np.isnan(windows.specific_force[0]) and windows.specific_force[1] == pytest.approx(10.0)
+    bias = [Unknown("bias", (axis,), 0.05) for axis in range(3)]
+    assert len(length_rows(windows, bias, np.eye(3), Priors())[0]) == 1
+    rows = [line.rsplit(",", 1)[0] for line in out.read_text(encoding="utf-8").splitlines()]
+    out.write_text("\n".join(rows) + "\n", encoding="utf-8")
+    earlier = LiveSession(robot, plan, out)
+    run(earlier, 1.0, 20.0, 3.5)
+    assert earlier.phase == Phase.DONE and read_measured(out, robot.cable_names).specific_force is None
+
+
 def test_a_base_that_leaves_its_pose_begins_it_again(robot, tmp_path):
     session = LiveSession(robot, session_plan(), tmp_path / "live.csv")
     now = run(session, 0.0, 0.0, 1.5)
@@ -290,6 +317,23 @@ def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     assert counted > 50 and inside / counted >= 0.9
     assert found["modulus"].share >= 0.9
     assert all(np.isfinite(one.width) and one.count >= 5 for one in found.values())
+
+
+def test_a_fit_finds_the_strain_at_which_friction_inside_the_material_slips(robot, plan):
+    """Of a robot whose friction slips at 30 % more: held to the strain of its class, the fit takes that for more friction."""
+    linear = LinearRobot(with_coarse_elements(robot), plan)
+    true = dataclasses.replace(starting_parameters(linear.robot, ()), slip=0.04, reach=1.3)
+    linear.measure(linear.predict(true).tip)
+    error = {}
+    for spread in (1e-6, 0.3):
+        priors = Priors(reach=spread)
+        fit = fit_statics(
+            linear.robot, linear.windows, groups={"creep"}, creep_times=linear.times, predictor=linear, priors=priors
+        )
+        found = {estimate.kind: estimate for estimate in fit.estimates}
+        error[spread] = abs(found["slip"].value - 0.04)
+    assert found["reach"].value == pytest.approx(1.3, abs=0.1) and abs(found["reach"].value - 1.3) < found["reach"].interval
+    assert error[0.3] < 0.3 * error[1e-6] and error[0.3] < found["slip"].interval
 
 
 def test_kinds_that_few_seeds_tell_are_counted_together():

@@ -4,7 +4,7 @@ A CSV file has a header and one row per sample:
 
     trial, time_s, gravity_x, gravity_y, gravity_z (m/s^2, in soft_base), CABLE_mm for every cable (empty: released),
     tip_x_mm, tip_y_mm, tip_z_mm (in soft_base), and, if measured, direction_x, direction_y, direction_z, specific_force (m/s^2,
-    its length by the IMU)
+    its length by the IMU; empty: not measured)
 
 `trial` may be missing if there is only one. A bag has `gravity`, `cable/state`, the tip as geometry_msgs/PoseStamped, and, where
 it was recorded, `imu/data`.
@@ -20,7 +20,9 @@ from gravcomp.calibration.bag import read_bag
 from gravcomp.calibration.csv_table import CsvTable
 from gravcomp.calibration.measured import Measured, MeasurementError
 
-_FORCE = "specific_force"
+FORCE = "specific_force"
+"""Name of the column of the specific force's length."""
+
 _VECTORS = (("gravity", ""), ("tip", "_mm"), ("direction", ""))
 """Names and units of the columns with three components."""
 
@@ -40,15 +42,15 @@ def write_csv(measured: Measured, path: Path, cables: tuple[str, ...]) -> None:
     directed = measured.tip_direction is not None
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(csv_header(cables, directed) + [_FORCE] * (measured.specific_force is not None))
+        writer.writerow(csv_header(cables, directed) + [FORCE] * (measured.specific_force is not None))
         for row in range(len(measured.time)):
             direction = None if measured.tip_direction is None else measured.tip_direction[row]
-            force = [] if measured.specific_force is None else [f"{measured.specific_force[row]:.4f}"]
+            force = None if measured.specific_force is None else float(measured.specific_force[row])
             writer.writerow(
                 csv_row(
                     int(measured.trial[row]), float(measured.time[row]), measured.gravity[row], measured.displacement[row],
-                    measured.tip_position[row], direction,
-                ) + force
+                    measured.tip_position[row], direction, force,
+                )
             )  # fmt: skip
 
 
@@ -60,12 +62,20 @@ def csv_header(cables: tuple[str, ...], directed: bool) -> list[str]:
 
 
 def csv_row(
-    trial: int, time: float, gravity: np.ndarray, displacement: np.ndarray, tip: np.ndarray, direction: np.ndarray | None
+    trial: int,
+    time: float,
+    gravity: np.ndarray,
+    displacement: np.ndarray,
+    tip: np.ndarray,
+    direction: np.ndarray | None,
+    force: float | None = None,
 ) -> list:
-    """Return the row of one sample, in SI."""
+    """Return the row of one sample, in SI. force: length of the specific force, NaN: not measured; None: has no column."""
     wound = ["" if math.isnan(x) else f"{1e3 * x:.4f}" for x in displacement]
     values = [f"{x:.5f}" for x in gravity] + wound + [f"{1e3 * x:.4f}" for x in tip]
-    return [trial, f"{time:.4f}", *values, *([] if direction is None else [f"{x:.6f}" for x in direction])]
+    values += [] if direction is None else [f"{x:.6f}" for x in direction]
+    length = [] if force is None else ["" if math.isnan(force) else f"{force:.4f}"]
+    return [trial, f"{time:.4f}", *values, *length]
 
 
 def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
@@ -83,5 +93,5 @@ def _read_csv(path: Path, cables: tuple[str, ...]) -> Measured:
         displacement=table.vectors(wound, 1e-3, empty=math.nan),
         tip_position=table.vectors(tip, 1e-3),
         tip_direction=table.vectors(direction) if set(direction) <= set(table.header) else None,
-        specific_force=table.numbers(_FORCE) if _FORCE in table.header else None,
+        specific_force=table.numbers(FORCE, empty=math.nan) if FORCE in table.header else None,
     )

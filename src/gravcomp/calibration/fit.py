@@ -26,6 +26,7 @@ import numpy as np
 from gravcomp.calibration.estimates import Estimate, estimate, fitted_together, moduli_told, name_of, partners_of, unfit, warnings
 from gravcomp.calibration.force_length import implausible_length, length_rows
 from gravcomp.calibration.measured import MeasurementError, StillWindows, rms_distance
+from gravcomp.calibration.noise_limit import limited, sag_of
 from gravcomp.calibration.parameters import StaticParameters, starting_parameters
 from gravcomp.calibration.plausible import check_explained, check_frame
 from gravcomp.calibration.problem import Predictor, Problem
@@ -55,7 +56,7 @@ class TipNoise:
         description="error of the stiffness that no fit sees, relative: inner friction, the law at small strain",
     )
     creep: float = parameter(
-        0.45,
+        0.35,
         minimum=0.0,
         maximum=2.0,
         description="error of a branch of creep that no fit sees, relative: bodies creep by other times than the branches",
@@ -68,7 +69,8 @@ class StaticFit:
     """Result of the fit.
 
     before and after: predictions with the initial and the fitted parameters; rms_before and rms_after: tip error over the windows
-    in m; evaluations: number of predictions for all windows, including `before` and `after`; creep_times: of the branches.
+    in m; evaluations: number of predictions for all windows, including `before` and `after`; creep_times: of the branches;
+    open_error and sag: what noise leaves open of the tips, and how far gravity moves the released one, in m (`noise_limit`).
     """
 
     parameters: StaticParameters
@@ -81,6 +83,8 @@ class StaticFit:
     evaluations: int
     warnings: tuple[str, ...]
     creep_times: tuple[float, ...] = ()
+    open_error: float = 0.0
+    sag: float | None = None
 
     @property
     def fitted(self) -> set[str]:
@@ -171,6 +175,7 @@ def fit_statics(
             f"no values describe these data better than the robot file does (tip error {1e3 * rms_before:.2f} mm before,"
             f" {1e3 * rms_after:.2f} mm after): nothing is written"
         )
+    open_error, sag = problem.open_error(x), sag_of(robot, windows, after)
     return StaticFit(
         parameters=parameters,
         estimates=estimates,
@@ -182,9 +187,11 @@ def fit_statics(
         evaluations=problem.evaluations,
         warnings=(
             *warnings(robot, unknowns, estimates, bool(np.isfinite(windows.displacement).any())),
-            *filter(None, [implausible_length(windows, priors)]),
+            *filter(None, [implausible_length(windows, priors), limited(open_error, sag)]),
         ),
         creep_times=creep_times,
+        open_error=open_error,
+        sag=sag,
     )
 
 

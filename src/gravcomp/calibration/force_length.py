@@ -33,11 +33,13 @@ def scale_rows(gravity: np.ndarray, mount: np.ndarray, priors: Priors) -> np.nda
 
 def implausible_length(windows: StillWindows, priors: Priors) -> str:
     """Return why the lengths cannot be those of a calibrated accelerometer, empty where they can, or were not measured."""
-    if windows.specific_force is None:
+    known = _with_lengths(windows)
+    if not known.any():
         return ""
+    assert windows.specific_force is not None  # it has numbers
     gravity = np.linalg.norm(windows.gravity, axis=1)
     away = windows.specific_force - gravity
-    worst = int(np.abs(away).argmax())
+    worst = int(np.nanargmax(np.abs(away)))
     most = IMPLAUSIBLE * float(np.hypot(priors.bias, priors.scale * gravity[worst]))
     if abs(away[worst]) <= most:
         return ""
@@ -52,17 +54,25 @@ def length_rows(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return rows (k, u) and what is expected of them (k,), over their deviations and independent of each other.
 
-    None (k = 0) where no plausible lengths were measured, or no bias is among the unknowns.
+    One for each window with a length. None (k = 0) where these are implausible, or no bias is among the unknowns.
     """
-    none = windows.specific_force is None or not any(unknown.kind == "bias" for unknown in unknowns)
-    if none or implausible_length(windows, priors):
+    known = _with_lengths(windows)
+    if not known.any() or not any(unknown.kind == "bias" for unknown in unknowns) or implausible_length(windows, priors):
         return np.zeros((0, len(unknowns))), np.zeros(0)
-    scales = scale_rows(windows.gravity, mount, priors)
-    covariance = np.diag(POSE_NOISE**2 / windows.shares) + scales @ scales.T
-    longer = windows.specific_force - np.linalg.norm(windows.gravity, axis=1)
-    found = np.column_stack([bias_rows(windows.gravity, unknowns), longer])
+    assert windows.specific_force is not None  # it has numbers
+    gravity = windows.gravity[known]
+    scales = scale_rows(gravity, mount, priors)
+    covariance = np.diag(POSE_NOISE**2 / windows.shares[known]) + scales @ scales.T
+    longer = windows.specific_force[known] - np.linalg.norm(gravity, axis=1)
+    found = np.column_stack([bias_rows(gravity, unknowns), longer])
     white = np.linalg.solve(np.linalg.cholesky(covariance), found)
     return white[:, :-1], white[:, -1]
+
+
+def _with_lengths(windows: StillWindows) -> np.ndarray:
+    """Return (k,) whether the length of a window was measured."""
+    force = windows.specific_force
+    return np.zeros(len(windows.gravity), dtype=bool) if force is None else np.isfinite(force)
 
 
 def _along(gravity: np.ndarray) -> np.ndarray:

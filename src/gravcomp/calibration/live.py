@@ -9,7 +9,8 @@ Each finished pose is added to a CSV file in the form of `files`. A session that
 After a pause the course begins again: a new trial, whose robot counts as relaxed. Poses that cannot be written, because the disk
 is full, are kept while the session goes on, and written as soon as there is room.
 
-Tips that cannot be of this robot are not taken, and `sentence` says why: another clock, other units, no numbers.
+Tips that cannot be of this robot are not taken, and `sentence` says why: another clock, other units, no numbers. Each row has the
+length of the specific force of its time, or nothing where the IMU gives none.
 """
 
 import csv
@@ -24,7 +25,7 @@ import numpy as np
 from gravcomp.calibration.approach import approached
 from gravcomp.calibration.bag import SAME_CLOCK, another_clock
 from gravcomp.calibration.csv_table import CsvTable
-from gravcomp.calibration.files import csv_header, csv_row
+from gravcomp.calibration.files import FORCE, csv_header, csv_row
 from gravcomp.calibration.measured import MeasurementError, StillWindows
 from gravcomp.calibration.plan import Plan, PlannedPose
 from gravcomp.calibration.plan_table import instruction
@@ -64,9 +65,11 @@ class LiveSession:
     def __init__(self, robot: Robot, plan: Plan, path: Path):
         """Begin, or go on with the file at `path`. Raises MeasurementError for a file of another robot or plan."""
         self._robot, self._plan, self._path, self._options = robot, plan, path, LiveOptions()
+        self._forced = True  # a file of an earlier release has no column of the specific force
         self._pose, self._trial = self._progress()
         self.phase = Phase.TURN if self._pose < len(plan.poses) else Phase.DONE
         self._gravities: list[tuple[float, np.ndarray]] = []
+        self._force: tuple[float, float] | None = None  # time in s and length in m/s^2
         self._rows: list[list] = []
         self._pending: list[list] = []  # rows of finished poses that are not in the file
         self.unwritten, self._refused = "", ""
@@ -121,6 +124,11 @@ class LiveSession:
         elif not reached:
             self.phase, self._rows = Phase.TURN, []
 
+    def on_force(self, time: float, force: np.ndarray) -> None:
+        """Take the specific force (3,) by the IMU in m/s^2; what is no number is left out."""
+        if np.isfinite(force).all():
+            self._force = time, float(np.linalg.norm(force))
+
     def command(self, time: float, present: np.ndarray) -> np.ndarray | None:
         """Return the displacements (m,) to send now, from the `present` ones on; None: send nothing."""
         pose = self.pose
@@ -144,7 +152,7 @@ class LiveSession:
         if self._refused:
             return
         gravity = self._gravities[-1][1]
-        self._rows.append(csv_row(self._trial, time, gravity, self._command, position, direction))
+        self._rows.append(csv_row(self._trial, time, gravity, self._command, position, direction, self._length_at(time)))
         if self.phase == Phase.REST and time - self._since >= self._plan.rest:
             self._finish()
 
@@ -170,7 +178,15 @@ class LiveSession:
 
     @property
     def _header(self) -> list[str]:
-        return ["pose", *csv_header(self._robot.cable_names, directed=True)]
+        return ["pose", *csv_header(self._robot.cable_names, directed=True), *[FORCE] * self._forced]
+
+    def _length_at(self, time: float) -> float | None:
+        """Return the length of the specific force, NaN where the last one is of another time; None: the file has none."""
+        if not self._forced:
+            return None
+        if self._force is None or abs(time - self._force[0]) > SAME_CLOCK:
+            return math.nan
+        return self._force[1]
 
     def _wrong(self, time: float, position: np.ndarray, direction: np.ndarray) -> str:
         """Return why a tip cannot be of this robot, empty where it can."""
@@ -201,6 +217,7 @@ class LiveSession:
         if not self._path.exists():
             return 0, 0
         table = CsvTable.read(self._path)
+        self._forced = FORCE in table.header
         if list(table.header) != self._header:
             raise MeasurementError(f"{self._path}: {_ANOTHER}")
         done, trial = (int(table.numbers(name).max(initial=-1.0)) for name in ("pose", "trial"))

@@ -1,5 +1,6 @@
 """Measured courses of the tip, and the windows in them in which the robot is at rest."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,15 +23,17 @@ class Measured:
     displacement: np.ndarray  # (t, m), NaN: released
     tip_position: np.ndarray  # (t, 3)
     tip_direction: np.ndarray | None = None  # (t, 3)
-    specific_force: np.ndarray | None = None  # (t,) m/s^2, its length by the IMU; None: not measured
+    specific_force: np.ndarray | None = None  # (t,) m/s^2, its length by the IMU, NaN: not measured; None: never
 
     def __post_init__(self) -> None:
-        for name in ("time", "gravity", "tip_position", "tip_direction", "specific_force"):
+        for name in ("time", "gravity", "tip_position", "tip_direction"):
             values = getattr(self, name)
             if values is not None and not np.isfinite(values).all():
                 raise MeasurementError(f"{self.source}: {name} has values that are not finite numbers")
-        if np.isinf(self.displacement).any():
-            raise MeasurementError(f"{self.source}: displacement has values that are infinite")
+        for name in ("displacement", "specific_force"):
+            values = getattr(self, name)
+            if values is not None and np.isinf(values).any():
+                raise MeasurementError(f"{self.source}: {name} has values that are infinite")
         if len(self.time) < 2:
             raise MeasurementError(f"{self.source}: has {len(self.time)} samples; at least 2 are needed")
         back = np.flatnonzero((np.diff(self.time) <= 0.0) & (np.diff(self.trial) == 0))
@@ -63,17 +66,35 @@ class Start:
 
 
 @dataclass(frozen=True)
+class Course:
+    """Where the measured tips went, in the order of time within each trial.
+
+    tip (t, 6): position in m and direction, zero where none was measured; begins (t,): whether a trial begins with the sample;
+    windows: the samples of each of the k windows.
+    """
+
+    tip: np.ndarray
+    begins: np.ndarray
+    windows: tuple[np.ndarray, ...]
+
+    def window_means(self, values: np.ndarray) -> np.ndarray:
+        """Return the means (k, n) over the samples of each window, of values (t, n)."""
+        return np.array([values[rows].mean(axis=0) for rows in self.windows])
+
+
+@dataclass(frozen=True)
 class History:
     """When k windows were, in the order of time within each trial.
 
     trial (k,); began (k,) in s: since when gravity and cables are as in the window; time (k,) in s: of its middle; starts: of the
-    trials, by number.
+    trials, by number; course: of the tips in and between the windows.
     """
 
     trial: np.ndarray
     began: np.ndarray
     time: np.ndarray
     starts: dict[int, Start]
+    course: Course
 
 
 @dataclass(frozen=True)
@@ -86,7 +107,7 @@ class StillWindows:
     tip_direction: np.ndarray | None = None  # (k, 3), of length 1; None: not measured
     history: History | None = None  # None: every window is relaxed
     share: np.ndarray | None = None  # (k,): one over the number of windows of the same rest; None: one each
-    specific_force: np.ndarray | None = None  # (k,) m/s^2, its length by the IMU; None: not measured
+    specific_force: np.ndarray | None = None  # (k,) m/s^2, its length by the IMU, NaN: not measured; None: never
 
     @property
     def shares(self) -> np.ndarray:
@@ -100,8 +121,10 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
     parts: windows of each rest, equally long in the logarithm of the time since cables and base came to rest, because a body
     creeps by such times; with one it is the last window of the rest. Raises MeasurementError if there is none.
     """
-    found, starts = [], {}
-    for trial in measured.trials():
+    found: list[tuple] = []
+    samples: list[np.ndarray] = []  # of each window
+    starts, trials, before = {}, measured.trials(), 0
+    for trial in trials:
         number = int(trial.trial[0])
         starts[number] = Start(float(trial.time[0]), trial.gravity[0], trial.displacement[0])
         for first, last in rests_of(trial, still):
@@ -109,8 +132,8 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             pieces = _pieces(trial, began, first, last, still, parts)
             for rows in pieces:
                 window = trial.rows(rows)
+                samples.append(before + rows)
                 direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
-                force = np.nan if window.specific_force is None else window.specific_force.mean()
                 found.append(
                     (
                         *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
@@ -119,20 +142,22 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
                         trial.time[began],
                         window.time.mean(),
                         1.0 / len(pieces),
-                        force,
+                        _mean_of_measured(window.specific_force),
                     )
                 )
+        before += len(trial.time)
     if not found:
         raise MeasurementError(
             f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    gravity, displacement, tip, direction, trials, since, middle, share, force = (np.array(column) for column in zip(*found))
+    gravity, displacement, tip, direction, numbers, since, middle, share, force = (np.array(column) for column in zip(*found))
     directed = measured.tip_direction is not None and np.ptp(measured.tip_direction, axis=0).max() > 0.0
     # A tracker of positions alone publishes one and the same orientation.
     unit = direction / np.linalg.norm(direction, axis=1, keepdims=True) if directed else None
     forces = None if measured.specific_force is None else force
-    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share, forces)
+    history = History(numbers, since, middle, starts, _course_of(trials, tuple(samples)))
+    return StillWindows(gravity, displacement, tip, unit, history, share, forces)
 
 
 def rests_of(trial: Measured, still: Standstill) -> list[tuple[int, int]]:
@@ -191,6 +216,19 @@ def _is_still(window: Measured, still: Standstill, limit: float) -> bool:
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     turned = np.ptp(direction, axis=0).max() <= still.gravity
     return bool(spread and same and cables and turned)
+
+
+def _course_of(trials: list[Measured], windows: tuple[np.ndarray, ...]) -> Course:
+    """Return the course of trials one after the other, with the samples of its windows."""
+    directions = [np.zeros_like(one.tip_position) if one.tip_direction is None else one.tip_direction for one in trials]
+    tip = np.concatenate([np.hstack([one.tip_position, direction]) for one, direction in zip(trials, directions)])
+    return Course(tip, np.concatenate([np.arange(len(one.time)) == 0 for one in trials]), windows)
+
+
+def _mean_of_measured(values: np.ndarray | None) -> float:
+    """Return the mean of the values that are not NaN; NaN: there are none."""
+    known = np.zeros(0) if values is None else values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
 
 
 def rms_distance(error: np.ndarray) -> float:

@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from gravcomp.calibration.measured import StillWindows, rms_distance
+from gravcomp.calibration.noise_limit import open_error
 from gravcomp.calibration.parameters import StaticParameters
 from gravcomp.calibration.statics import StaticPrediction
 from gravcomp.calibration.unknowns import Unknown, parameters_at
@@ -164,6 +165,10 @@ class Problem:
         """Return the covariance (u, u) of x, with every unknown free."""
         rows = self.jacobian(x)
         return np.linalg.pinv(rows.T @ rows)
+
+    def open_error(self, x: np.ndarray) -> float:
+        """Return the root mean square error in m of the tips that the covariance of x leaves."""
+        return open_error(self._by(x)[:, :3], self.covariance(x), self._root**2)
 
     def residuals(self, x: np.ndarray) -> np.ndarray:
         """Return the scaled tip errors and those of the prior."""

@@ -28,6 +28,12 @@ def calibration_result(
     figures = [
         Figure("tip error at rest before, RMS", 1e3 * statics.rms_before, "mm"),
         Figure("tip error at rest after, RMS", 1e3 * statics.rms_after, "mm", "", 1e3 * statics.rms_before),
+        Figure("tip error that the noise leaves open, RMS", 1e3 * statics.open_error, "mm"),
+        *(
+            []
+            if statics.sag is None
+            else [Figure("the same, of the released robot's sag", 100.0 * statics.open_error / statics.sag, "%")]
+        ),
         Figure("evaluations at rest", statics.evaluations, ""),
     ]
     parts: list = [
@@ -88,6 +94,8 @@ def calibration_result(
             "parameters": [vars(e) for e in statics.estimates],
             "tip_error_before_mm": 1e3 * statics.rms_before,
             "tip_error_after_mm": 1e3 * statics.rms_after,
+            "open_error_mm": 1e3 * statics.open_error,
+            "sag_mm": None if statics.sag is None else 1e3 * statics.sag,
             "damping_time_ms": None
             if motion is None or not motion.damping_seen
             else [1e3 * motion.damping_time, 1e3 * motion.damping_interval],

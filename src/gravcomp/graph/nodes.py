@@ -249,6 +249,7 @@ NODES = (
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "gravity in m/s^2: when the base is turned as planned"),
             Port("cable/state", "gravcomp_msgs/msg/CableState", "displacements from which the cables are moved"),
             Port("measured/tip", "geometry_msgs/msg/PoseStamped", "tip in soft_base, m; another topic by `tip_topic`"),
+            Port("imu/data", "sensor_msgs/msg/Imu", "length of the specific force in m/s^2", optional=True),
         ),
         publishes=(
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "planned displacements of the cables in m"),
