@@ -20,7 +20,6 @@ from gravcomp.cache import cache_folder, content_key
 from gravcomp.whole_file import write_whole
 
 PACKAGE = Path(__file__).parent
-_LOCATORS = "gravcomp.numba_locator.ContentLocator,UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator"
 _NUMBA = re.compile(rb"^(?:from|import) numba\b", re.MULTILINE)
 _IMPORTS = re.compile(rb"^from (gravcomp[\w.]*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 _COMMENT = re.compile(r"#[^\n]*")
@@ -38,15 +37,6 @@ class Source:
     compiled: bool
     tuples: bool
     imported: dict[str, list[str]]
-
-
-def configure_numba() -> None:
-    """Let Numba keep its compiled functions in the cache; to be called before the first import of numba.
-
-    A NUMBA_CACHE_DIR of the user's own has precedence; then Numba decides by itself what is up to date.
-    """
-    if "NUMBA_CACHE_DIR" not in os.environ:
-        os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", _LOCATORS)
 
 
 def compiled_folder() -> Path:

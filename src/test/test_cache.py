@@ -1,6 +1,9 @@
 """Cache keys follow the content: equal content, equal key; any change, another key."""
 
 import ast
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -143,3 +146,12 @@ def test_the_digests_of_unchanged_files_are_remembered(tmp_path, monkeypatch):
     compiled_functions._sources.cache_clear()
     monkeypatch.setattr(compiled_functions, "digest", lambda *source: pytest.fail("a file was read again"))
     assert compiled_functions.compiled_folder() == folder
+
+
+@pytest.mark.parametrize("first", ["import numba", "import gravcomp.scene.scene", "pass"])
+def test_compiled_functions_are_kept_by_their_code_whatever_is_imported_first(first):
+    """Numba's own places look at the time of one file, and would keep a function whose callee in another file has changed."""
+    program = f"{first}; import gravcomp.contact.places as m; print(type(m.find_places._cache._impl.locator).__name__)"
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    done = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert done.stdout.strip() == "ContentLocator", done.stderr

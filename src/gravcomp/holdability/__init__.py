@@ -7,12 +7,6 @@ print(answer.sentence)
 the sphere; `linear` gives a first answer from the response of the robot at rest.
 """
 
-# ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
-
-from gravcomp.compiled_functions import configure_numba
-
-configure_numba()
-
 from gravcomp.holdability.answer import Binding, DirectionAnswer, Holdability, Needed
 from gravcomp.holdability.options import HoldOptions
 from gravcomp.holdability.sphere import holdability

@@ -1,11 +1,5 @@
 """The inverse problem: the cable displacements that bring the modelled robot to its target."""
 
-# ruff: noqa: E402 (the cache of Numba is configured before the first module here imports Numba)
-
-from gravcomp.compiled_functions import configure_numba
-
-configure_numba()
-
 from gravcomp.inverse.command import Command
 from gravcomp.inverse.controller import InverseController
 from gravcomp.inverse.options import InverseOptions

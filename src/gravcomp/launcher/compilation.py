@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gravcomp.compiled_functions import compiled_folder, configure_numba
+from gravcomp.compiled_functions import compiled_folder
 from gravcomp.environment.end_with_parent import end_with_parent
 
 if TYPE_CHECKING:
@@ -233,7 +233,6 @@ _WORK = {
 def main(parts: list[str]) -> int:
     """Compile the parts; returns 0."""
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    configure_numba()
     for part in parts:
         compile_part(part)
     return 0

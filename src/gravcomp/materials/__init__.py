@@ -3,7 +3,3 @@
 A symmetric tensor is an array of six components in the order 11 22 33 12 23 13 (Voigt). Shear strains are doubled, shear
 stresses are not.
 """
-
-from gravcomp.compiled_functions import configure_numba
-
-configure_numba()

@@ -2,7 +2,3 @@
 
 It shares no mechanical model with the controller. `VirtualRobot(parameters, robot, hardware, seed).step(dt, frames) -> frames`.
 """
-
-from gravcomp.compiled_functions import configure_numba
-
-configure_numba()  # before the first module here imports Numba
