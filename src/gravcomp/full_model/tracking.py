@@ -19,6 +19,7 @@ import math
 import numpy as np
 
 from gravcomp.cables.friction import Sliding
+from gravcomp.full_model.alternation import Alternation
 from gravcomp.full_model.applied_load import AppliedLoad
 from gravcomp.full_model.cable_input import CableInput
 from gravcomp.full_model.contact import FullContact
@@ -68,6 +69,7 @@ class StaticTracker:
         self.longest_step = longest_step * model.length
         self.near = near * model.length
         self.viscous: ViscousStrain | None = None
+        self._alternation = Alternation()
         self._matrix = model.new_matrix()
         model.elements.assemble(np.zeros_like(model.mesh.nodes), self._matrix)
         self._stiffness = self._matrix.mean_diagonal()
@@ -139,6 +141,7 @@ class StaticTracker:
             self._go_ahead(state, self._before)
         if self.contact is not None:
             self.contact.begin(previous, gravity)
+            self._alternation.begin()
             iterations *= _MORE_IN_CONTACT
         loads = with_payload(self.model, gravity / fraction, loads)
         load = AppliedLoad(self.model.weight(gravity), loads, fraction)
@@ -232,11 +235,14 @@ class StaticTracker:
             tension = cables.tensions(state.compliance, free, state.tension > 0.0)
             step = y + state.answer @ tension
         size = float(np.abs(step).max())
-        moved = self._damped_move(state, step, tension, size) if math.isfinite(size) else None
+        if not math.isfinite(size):
+            return None
+        part = 1.0 if self.contact is None else self._alternation.part(step)
+        moved = self._damped_move(state, part * step, state.tension + part * (tension - state.tension), part * size)
         if moved is None:
             return None
         start, undamped = moved
-        if exact and undamped:
+        if exact and undamped and part == 1.0:
             start, size = self._correct(state, solver, load, cables, jacobian, start, size, tolerance, reused, supported)
             # The tangent of corotational elements is not exact: steps shrink slowly. This one is short enough.
             state.converged |= size < _SHORT * tolerance
