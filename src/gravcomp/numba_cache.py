@@ -2,6 +2,7 @@
 
 import os
 import sys
+from typing import Any
 
 _LOCATORS = "gravcomp.numba_locator.ContentLocator,UserProvidedCacheLocator,InTreeCacheLocator,UserWideCacheLocator"
 
@@ -15,6 +16,6 @@ def configure_numba() -> None:
     if "NUMBA_CACHE_DIR" in os.environ:
         return
     locators = os.environ.setdefault("NUMBA_CACHE_LOCATOR_CLASSES", _LOCATORS)
-    config = sys.modules.get("numba.core.config")
+    config: Any = sys.modules.get("numba.core.config")
     if config is not None and not config.CACHE_DIR and not config.CACHE_LOCATOR_CLASSES:
         config.CACHE_LOCATOR_CLASSES = locators  # the environment was read when Numba was imported
