@@ -184,6 +184,24 @@ def test_a_large_measured_error_ends_the_use_of_the_reduced_model(built):
     assert "the tip error of the reduced model is" in serving.reason
 
 
+@pytest.mark.parametrize(("motion", "times"), [("gravity", 5), ("cables", 2)])
+def test_the_error_is_measured_again_after_a_motion_however_long_the_reach_is(built, motion, times):
+    """A soft robot falls over when its cables are released: shapes that are held are near by, compared with that."""
+    model, _ = built
+    simulator = Simulator(model)
+    serving = simulator._serving
+    far = dataclasses.replace(serving.reduced, reach=1e3 * serving.reduced.reach)
+    serving = simulator._serving = ReducedServing(model, far, simulator.solver)
+    measured, measure = [], serving._measured_error
+    serving._measured_error = lambda *given: measured.append(given) or measure(*given)
+    wound = np.zeros(model.tendons.count)
+    for share in np.linspace(0.0, 1.0, 101):
+        angle = np.pi / 2 * share if motion == "gravity" else 0.0
+        wound[0] = 0.05 * model.length * share if motion == "cables" else 0.0
+        simulator.step(9.81 * np.array([np.sin(angle), 0.0, -np.cos(angle)]), wound)
+    assert len(measured) == times
+
+
 def test_a_robot_of_linear_tetrahedra_is_refused_with_the_reason(robot, cache):
     linear = RobotModel(robot, tube_mesh(robot, "tet4"))
     assert "corotational" in why_not(linear)

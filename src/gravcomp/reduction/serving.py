@@ -32,8 +32,11 @@ from gravcomp.reduction.tracking import ReducedState, ReducedTracker
 
 # Largest tip error of the reduced model as a fraction of the length; below half of it, the reduced model is used again.
 _TOLERANCE = 1e-3
-# Steps between two measurements of the error; smallest number of steps after a motion by this fraction of the reach.
-_CHECK_EVERY, _CHECK_AT_LEAST, _CHECK_MOVED = 300, 20, 0.1
+# Steps between two measurements of the error; smallest number of steps after which a motion asks for one.
+_CHECK_EVERY, _CHECK_AT_LEAST = 300, 20
+# Such a motion: of the shape over the reach, of gravity (over its size: 15 deg), and of a cable over the length. The reach of a
+# soft robot, which falls over when its cables are released, is so long that shapes that are held are all near by.
+_MOVED, _TURNED, _WOUND = 0.1, 0.26, 0.03
 # Steps of the full model before the reduced model is tried again.
 _RETURN_AFTER = 25
 # Iterations in which the reduced model may find the forces of contact at a shape of the full one.
@@ -74,8 +77,7 @@ class ReducedServing:
         """Return to the straight robot; the reduced model is used."""
         self._tracker.place(np.zeros(self.reduced.size), np.zeros(self._model.tendons.count))
         self._error, self._beyond_range = self.reduced.error, ""
-        self._since_check = _CHECK_EVERY - _CHECK_AT_LEAST
-        self._checked_at = self._tracker.state.q
+        self._mark(self._tracker.state, np.zeros(3))
         self._memory = self._memory.relaxed(self._tracker.state.q, self._tracker.strain)
         self._until_return = 0
         self.reason = ""
@@ -139,10 +141,9 @@ class ReducedServing:
             self._leave(_NEAR_ITSELF, wait=_RETURN_AFTER)
             return None
         self._since_check += 1
-        moved = state.q - self._checked_at
-        far = moved @ moved > (_CHECK_MOVED * self.reduced.reach) ** 2 and self._since_check >= _CHECK_AT_LEAST
-        if far or self._since_check >= _CHECK_EVERY:
-            self._since_check, self._checked_at = 0, state.q
+        moved = self._since_check >= _CHECK_AT_LEAST and self._has_moved(state, gravity)
+        if moved or self._since_check >= _CHECK_EVERY:
+            self._mark(state, gravity)
             self._error = self._measured_error(gravity, cables, h, loads)
             if not self._error < self._tolerance:
                 self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
@@ -193,7 +194,8 @@ class ReducedServing:
             return
         error = float(np.linalg.norm(self.reduced.tip(own.q) - self._tip(state.u)))
         if own.converged and self.reduced.outside(own.q) <= 1.0 and error < 0.5 * self._tolerance:
-            self.reason, self._error, self._since_check, self._checked_at = "", error, 0, own.q
+            self.reason, self._error = "", error
+            self._mark(own, gravity)
 
     def _tracked(
         self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None, iterations: int = 20
@@ -233,6 +235,20 @@ class ReducedServing:
             tension=self._tracker.state.tension.copy(),
             tendons=self._model.tendons.state(self._model.mesh.nodes + u, sliding.direction),
             touch=None if contact is None else contact.hand_over(u),
+        )
+
+    def _mark(self, state: ReducedState, gravity: np.ndarray) -> None:
+        """Remember where the error is measured: at this state under gravity (3,)."""
+        self._since_check, self._checked_at = 0, (state.q, gravity.copy(), state.displacement)
+
+    def _has_moved(self, state: ReducedState, gravity: np.ndarray) -> bool:
+        """Return whether the robot is far from where the error was measured."""
+        q, direction, displacement = self._checked_at
+        moved, turned = state.q - q, gravity - direction
+        return bool(
+            moved @ moved > (_MOVED * self.reduced.reach) ** 2
+            or turned @ turned > _TURNED**2 * (gravity @ gravity)
+            or np.abs(state.displacement - displacement).max(initial=0.0) > _WOUND * self._model.length
         )
 
     def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> float:
