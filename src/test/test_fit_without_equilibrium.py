@@ -177,7 +177,8 @@ def test_the_error_of_a_described_robot_whose_motion_cannot_be_computed_is_unkno
     assert fit.rms_before is None and fit.rms_after < 1e-4
     tips = SimpleNamespace(tip=np.zeros((1, 6)))
     statics = SimpleNamespace(
-        estimates=[], fitted=(), warnings=[], rms_before=1e-3, rms_after=1e-4, evaluations=1, before=tips, after=tips,
+        estimates=[], fitted=(), warnings=[], rms_before=1e-3, rms_after=1e-4, open_error=1e-5, sag=None, evaluations=1,
+        before=tips, after=tips,
         windows=StillWindows(GRAVITY[None], np.full((1, 1), np.nan), np.zeros((1, 3))),
     )  # fmt: skip
     result = calibration_result("fall", "fitted.yaml", statics, fit, [fall], 0.01)
