@@ -18,7 +18,6 @@ from gravcomp.virtual.equilibrium import equilibrium
 from gravcomp.virtual.held_sections import held_depth
 from gravcomp.virtual.parameters import Body, Tendons, VirtualRobotParameters
 from gravcomp.virtual.sliced_body import slice_of
-from gravcomp.virtual.widening import across_energy, add_across, tangent_to_strain, to_strain, widened, widened_strains
 
 SOFT = {"youngs_modulus_mpa": 0.8, "poissons_ratio": 0.45, "density": 1145.0}
 NITINOL = {"youngs_modulus_mpa": 60000.0, "poissons_ratio": 0.3, "density": 6450.0}
@@ -89,70 +88,6 @@ def test_the_sag_is_that_of_the_full_model(kind):
     assert np.linalg.norm(equilibrium(rod, gravity).tip - at_rest - full) < 0.02 * np.linalg.norm(full)
 
 
-@pytest.mark.parametrize(
-    ("length", "outline", "material", "radius", "tension"),
-    [
-        (100, (9, 3.6), {"law": "svk"}, 3.15, (1.4, 0.0)),
-        (100, (9, 3.6), {"law": "svk"}, 3.15, (2.4, 2.1)),
-        (150, (6, 2.0), {"law": "neo_hookean", "youngs_modulus_mpa": 1.5, "poissons_ratio": 0.49}, 2.0, (0.7, 0.0)),
-        (150, (6, 2.0), {"law": "neo_hookean", "youngs_modulus_mpa": 1.5, "poissons_ratio": 0.49}, 2.0, (1.0, 0.85)),
-        (60, (12, 4.0), {"law": "yeoh", "youngs_modulus_mpa": 0.3, "poissons_ratio": 0.47}, 4.5, (1.0, 0.0)),
-    ],
-    ids=["bent svk", "pressed svk", "bent neo-Hookean", "pressed neo-Hookean", "bent Yeoh"],
-)
-def test_strong_cables_bend_the_rod_as_the_full_model(length, outline, material, radius, tension):
-    """One cable pulls with the first tension, two with the second: bends of 14 to 121 deg, sections pressed by 2 to 15 %.
-
-    A rod whose section keeps its form is 1.1 to 5.7 % of its tip's way off.
-    """
-    segment = {"name": "s0", "length_mm": length, "outer_diameter_mm": outline[0], "lumen_diameter_mm": outline[1]}
-    cables = [{"name": f"c{i}", "angle_deg": 120 * i, "radius_mm": radius, "segment": "s0"} for i in range(3)]
-    elements = {"around": 6, "along": 14, "radial": 1, "equal_stiffness": True, "grading": 8.0}
-    mapping = {"name": "pulled", "segments": [segment | {"material": SOFT | material}], "cables": cables, "elements": elements}
-    described = from_mapping(Robot, mapping, source="test", key="robot")
-    pulled, straight = np.array([tension[0], tension[1], tension[1]]), np.array([0.0, 0.0, 1e-3 * length])
-    full = Simulator(described, reduced=False).solve(np.zeros(3), tension=pulled)
-    assert full.is_equilibrium
-    off = equilibrium(exact_rod(described), np.zeros(3), tension=pulled).tip - full.tip_position
-    assert np.linalg.norm(off) < 5e-3 * np.linalg.norm(full.tip_position - straight)
-
-
-def test_a_pressed_section_widens_about_its_centroid_and_its_derivatives_agree_with_finite_differences():
-    rod, random = exact_rod(robot("lumen off the axis")), np.random.default_rng(3)
-    filament, curve, rest, across = rod.filament[3], rod.curve[3], rod.rest_strain[3], rod.across[3]
-    stress, matrix = random.standard_normal(6), random.standard_normal((6, 6))
-    matrix = matrix @ matrix.T
-
-    def terms(strain):
-        """Energy, and its first and second derivatives by the rod's strain, of a law that is linear in the section's own."""
-        own, change, sigma = np.empty(6), np.empty(6), np.empty(6)
-        s, rate, second = widened(strain, rest, filament, curve, own, change)
-        off, tangent = own - rest, matrix.copy()
-        of_own = stress + matrix @ off
-        x, y = 40.0 * off[3:5]  # far enough from 0 for the anticlastic energy to count
-        energy = stress @ off + 0.5 * off @ matrix @ off + 1e4 * across_energy(x, y, across)
-        more, bend = np.zeros(6), np.zeros((6, 6))
-        add_across(x, y, across, more, bend)
-        of_own, tangent = of_own + 4e5 * more, tangent + 1.6e7 * bend
-        to_strain(of_own, filament, s, rate, change, sigma)
-        tangent_to_strain(of_own, tangent, filament, s, rate, second, change)
-        return energy, sigma, tangent
-
-    strain, step = rest + 0.1 * random.standard_normal(6), 1e-6
-    _, sigma, tangent = terms(strain)
-    for i, way in enumerate(step * np.eye(6)):
-        (more, more_sigma, _), (less, less_sigma, _) = terms(strain + way), terms(strain - way)
-        assert (more - less) / (2 * step) == pytest.approx(sigma[i], rel=1e-6, abs=1e-6)
-        assert (more_sigma - less_sigma) / (2 * step) == pytest.approx(tangent[:, i], rel=1e-5, abs=1e-5)
-    own, change, pressed = np.empty(6), np.empty(6), np.array([0.0, 0.0, 0.9, 2.0, -3.0, 0.5])
-    s, _, _ = widened(pressed, rest, filament, curve, own, change)
-    assert s > 1.04
-    y, x = filament[-1, 0], -filament[-1, 1]
-    at_centroid = [v[2] + v[3] * y - v[4] * x for v in (pressed, own)]
-    assert at_centroid[0] == pytest.approx(at_centroid[1])
-    assert own[3:] == pytest.approx(s * pressed[3:])
-
-
 @pytest.mark.parametrize("moduli", [(3.0, 0.6), (0.6, 3.0)])
 def test_a_stiff_stretch_hinders_its_soft_neighbour_from_contracting(moduli):
     """A rod without that sags by 0.7 and 0.5 % more than the full model; with nu = 0 they differ by 0.1 %."""
@@ -206,18 +141,16 @@ def energy(rod, shape) -> float:
     """Elastic energy of the rod, J."""
     from gravcomp.virtual.rod import strains
 
-    strain, own = np.empty((rod.elements, 6)), np.empty((rod.elements, 6))
+    strain = np.empty((rod.elements, 6))
     strains(shape.orientation, shape.position, rod.length, strain)
-    widened_strains(strain, rod.rest_strain, rod.filament, rod.curve, own)
-    off = own - rod.rest_strain
+    off = strain - rod.rest_strain
     linear = 0.5 * np.einsum("e,ei,eij,ej->", rod.length, off, rod.stiffness, off)
     # The law's curve: integral of c e^2 + d e^3 in each filament, whose strain e stays on this side of the straight part.
     of_filament = off[:, 2, None] + off[:, 3, None] * rod.filament[:, :, 0] + off[:, 4, None] * rod.filament[:, :, 1]
     c, d, folding = (rod.curve[:, i, None] for i in range(3))
     assert np.all(of_filament > folding)
     curved = np.einsum("e,ef,ef->", rod.length, rod.filament[:, :, 2], c * of_filament**3 / 3 + d * of_filament**4 / 4)
-    moved = sum(s * across_energy(x, y, a) for s, (x, y), a in zip(rod.length, off[:, 3:5], rod.across))
-    return float(linear + curved + moved)
+    return float(linear + curved)
 
 
 def test_section_constants_of_closed_forms():

@@ -21,7 +21,6 @@ from gravcomp.virtual.stretches import Stretch, stretch_at, stretches_of
 from gravcomp.virtual.tendon_friction import TendonFriction
 from gravcomp.virtual.true_robot import TrueRobot
 from gravcomp.virtual.ways import element_marks, routing_of
-from gravcomp.virtual.widening import across_coefficients
 
 _LARGEST_TURN = 0.15  # rad by which an element is bent at rest
 _FIRST_BENDING = 3.516  # squared wave number of a cantilever times its length squared
@@ -38,7 +37,7 @@ def build_rod(true: TrueRobot) -> RodModel:
     ends = _element_ends(true, axis, stretches, [s for _, s, _ in loads])
     length, middle = np.diff(ends), (ends[1:] + ends[:-1]) / 2
     n = len(length)
-    filament, curve, moved = np.empty((n, 9, 3)), np.empty((n, 5)), np.empty((n, 8))
+    filament, curve = np.empty((n, 9, 3)), np.empty((n, 3))
     stiffness, rest_strain = np.empty((n, 6, 6)), np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (n, 1))
     mass, moment, inertia = np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3, 3))
     for e, z in enumerate(middle):
@@ -46,7 +45,6 @@ def build_rod(true: TrueRobot) -> RodModel:
         section, material = stretch.section(z), stretch.material
         stiffness[e] = section.stiffness(material)
         filament[e], curve[e] = filaments(stiffness[e][2:5, 2:5]), curve_of_law(material)
-        moved[e] = across_coefficients(filament[e], curve[e])
         rest_strain[e, 3:5] = _curvature(axis, z)
         half = material.density * section.area * length[e] / 2
         across = np.diag([1.0, 1.0, 0.0]) * half * length[e] ** 2 / 12
@@ -69,9 +67,7 @@ def build_rod(true: TrueRobot) -> RodModel:
     lines = true.cables
     inside = np.array([robot.line_length(cable) - (cable.free_length or 0.0) for cable in robot.cables])
     spring = lines.axial_stiffness / (lines.free_length + inside)
-    return RodModel(
-        length, stiffness, filament, curve, moved, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring
-    )
+    return RodModel(length, stiffness, filament, curve, rest_strain, mass, centre, inertia, routing_of(robot, ends), spring)
 
 
 def build_material(model: RodModel, true: TrueRobot) -> RodMaterial:

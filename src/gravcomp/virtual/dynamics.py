@@ -17,7 +17,6 @@ from gravcomp.virtual.se3 import rotation_exp, rotation_log
 from gravcomp.virtual.surroundings import RodSurroundings, Touches, own_touches_of, touches_of
 from gravcomp.virtual.tendon_friction import TendonFriction, tension_shares
 from gravcomp.virtual.time_step import time_step
-from gravcomp.virtual.widening import widened_strains
 
 _PARTS = 4  # of a step that does not converge at once
 
@@ -40,7 +39,7 @@ class MovingRod:
         self._acceleration, self._velocity_rate = np.zeros((n + 1, 6)), np.zeros((n + 1, 6))
         self._branch_strain = np.tile(model.rest_strain, (k, 1, 1))
         self._slip_strain = model.rest_strain[:, 3:5].copy()
-        self.strain, self._own_strain = np.zeros((n, 6)), np.zeros((n, 6))
+        self.strain = np.zeros((n, 6))
         self._sliding = np.zeros((m, n + 1))  # the guide first
         self._path = np.zeros((m, n))
         self._wound = np.zeros(m)
@@ -128,8 +127,8 @@ class MovingRod:
         self._acceleration[:] = 0.0
         self._velocity_rate[:] = 0.0
         self._measure()
-        self._branch_strain[:] = self._own_strain
-        self._slip_strain[:] = self._own_strain[:, 3:5]
+        self._branch_strain[:] = self.strain
+        self._slip_strain[:] = self.strain[:, 3:5]
         self.tension = shape.tension.copy()
         self._compliance[:] = 0.0
         self._held[:] = 0.0
@@ -208,7 +207,6 @@ class MovingRod:
             model.stiffness,
             model.filament,
             model.curve,
-            model.across,
             model.rest_strain,
             self.mass,
             self.centre,
@@ -267,16 +265,8 @@ class MovingRod:
     def _measure(self) -> None:
         model = self.model
         strains(self.orientation, self.position, model.length, self.strain)
-        widened_strains(self.strain, model.rest_strain, model.filament, model.curve, self._own_strain)
         tendon_lengths(
-            self.orientation,
-            self.position,
-            self._own_strain,
-            model.length,
-            model.routing,
-            self._direction,
-            self._chord,
-            self._path,
+            self.orientation, self.position, self.strain, model.length, model.routing, self._direction, self._chord, self._path
         )
         self.shortened[:] = model.tendon_length - self._path.sum(axis=1)
 

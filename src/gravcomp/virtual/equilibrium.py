@@ -4,7 +4,7 @@ It is the minimum of the potential energy of rod, tendons and weight, with the l
 iteration runs on the residual of `assemble` of forces.py. Each increment is changed until it is a direction of descent, and
 shortened until the energy falls, because cables change between taut and slack and a straight rod under strong cables is unstable:
 
-    U = sum_e L (1/2 (epsilon - epsilon_0)^T K (epsilon - epsilon_0) + E int (c e^3/3 + d e^4/4) dA + U_a)
+    U = sum_e L (1/2 (epsilon - epsilon_0)^T K (epsilon - epsilon_0) + E int (c e^3/3 + d e^4/4) dA)
         + sum_c (T_c l_c + k/2 max(0, u + l_c - l_0)^2) - sum_k m_k g (p_k + R_k c_k)
 """
 
@@ -18,7 +18,6 @@ from gravcomp.virtual.forces import assemble, half_bandwidth
 from gravcomp.virtual.rod import RodModel, strains
 from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
-from gravcomp.virtual.widening import across_energy, widened_strains
 
 _MOST_ITERATIONS = 200
 _MOST_HALVINGS = 12
@@ -94,7 +93,6 @@ def _settled(
         model.stiffness,
         model.filament,
         model.curve,
-        model.across,
         model.rest_strain,
         model.mass,
         model.centre,
@@ -126,7 +124,6 @@ def _settle(
     stiffness: np.ndarray,
     filament: np.ndarray,
     curve: np.ndarray,
-    across: np.ndarray,
     rest_strain: np.ndarray,
     mass: np.ndarray,
     centre: np.ndarray,
@@ -146,7 +143,7 @@ def _settle(
     The number of iterations is _MOST_ITERATIONS where no equilibrium was found.
     """
     n, m, width = length.shape[0], tendon_rest.shape[0], band.shape[1]
-    strain, own, path = np.empty((n, 6)), np.empty((n, 6)), np.empty((m, n))
+    strain, path = np.empty((n, 6)), np.empty((m, n))
     gradient, pull = np.empty((6 * n, m)), np.empty((6 * n, m))
     factors = np.empty(band.shape)
     none, no_slip, share = np.zeros(n), np.zeros((n, 2)), np.ones((m, n))
@@ -157,11 +154,10 @@ def _settle(
     tension, active, shortened, compliance = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     turn, shift, work = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     strains(orientation, position, length, strain)
-    widened_strains(strain, rest_strain, filament, curve, own)
-    tendon_lengths(orientation, position, own, length, routing, direction, chord, path)
-    law = length, stiffness, filament, curve, across, rest_strain
+    tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
+    law = length, stiffness, filament, curve, rest_strain
     loads = tendon_rest, spring, wound, preload, force, centre
-    energy = _energy(orientation, position, own, path, *law, *loads)
+    energy = _energy(orientation, position, strain, path, *law, *loads)
     for iteration in range(_MOST_ITERATIONS):
         for c in range(m):
             shortened[c] = tendon_rest[c] - np.sum(path[c])
@@ -177,7 +173,6 @@ def _settle(
             constant,
             filament,
             curve,
-            across,
             none,
             none,
             no_slip,
@@ -223,9 +218,8 @@ def _settle(
                 motion_exp(factor * increment[6 * k : 6 * k + 6], turn, shift)
                 advance(orientation[k + 1], position[k + 1], turn, shift, work)
             strains(orientation, position, length, strain)
-            widened_strains(strain, rest_strain, filament, curve, own)
-            tendon_lengths(orientation, position, own, length, routing, direction, chord, path)
-            energy = _energy(orientation, position, own, path, *law, *loads)
+            tendon_lengths(orientation, position, strain, length, routing, direction, chord, path)
+            energy = _energy(orientation, position, strain, path, *law, *loads)
             if energy <= start_energy + 1e-4 * factor * slope + _ROUNDING * tolerances[1]:
                 break
             factor *= 0.5
@@ -242,7 +236,6 @@ def _energy(
     stiffness: np.ndarray,
     filament: np.ndarray,
     curve: np.ndarray,
-    across: np.ndarray,
     rest_strain: np.ndarray,
     tendon_rest: np.ndarray,
     spring: np.ndarray,
@@ -268,7 +261,6 @@ def _energy(
             density += beyond * bent**2 * (curve[e, 0] + curve[e, 1] * bent)
             density += 0.5 * beyond**2 * bent * (2.0 * curve[e, 0] + 3.0 * curve[e, 1] * bent)
             energy += length[e] * filament[e, f, 2] * density
-        energy += length[e] * across_energy(x, y, across[e])
     for c in range(path.shape[0]):
         total = np.sum(path[c])
         stretch = max(0.0, wound[c] + total - tendon_rest[c])

@@ -2,9 +2,8 @@
 
 With the strain epsilon = theta / L of an element between the cross-sections A and B (see rod.py):
 
-    sigma = K (epsilon - epsilon_0) + ...                            Cosserat law; the history of the material adds to it,
-                                                                     `law_curve` what the law adds to a linear one, and
-                                                                     `widening` what the section's change of form adds
+    sigma = K (epsilon - epsilon_0) + ...                            Cosserat law; the history of the material adds to it, and
+                                                                     `law_curve` what the law adds to a linear one
     delta theta = J_r^-1(theta) eta_B - J_l^-1(theta) eta_A          eta: body-frame variations of the two cross-sections
 
 A tendon at the offset d with the tension T pulls in the element with T (t, d x t), t the unit vector along v + w x d + d' (D. C.
@@ -25,7 +24,6 @@ from numba import njit
 
 from gravcomp.virtual.routing import Routing, add_chords
 from gravcomp.virtual.se3 import inverse_jacobians
-from gravcomp.virtual.widening import add_across, tangent_to_strain, to_strain, widened
 
 
 @njit(cache=True, error_model="numpy")
@@ -38,7 +36,6 @@ def assemble(
     constant: np.ndarray,
     filament: np.ndarray,
     curve: np.ndarray,
-    across: np.ndarray,
     slip_stiffness: np.ndarray,
     slip_moment: np.ndarray,
     slip_strain: np.ndarray,
@@ -66,8 +63,8 @@ def assemble(
         Of the elements; epsilon_0 is that of the unloaded rod.
     linear, constant : (n, 6, 6), (n, 6)
         Of the material's law: sigma = linear (epsilon - epsilon_0) + constant + curve + friction + tendons.
-    filament, curve, across : (n, 9, 3), (n, 5), (n, 8)
-        Of the law's curve and of the widening, see law_curve.py and widening.py.
+    filament, curve : (n, 9, 3), (n, 3)
+        Of the law's curve, see law_curve.py.
     slip_stiffness, slip_moment, slip_strain : (n,) N m^2, (n,) N m, (n, 2) 1/m
         Of the material's friction, see material.py.
     routing : Routing
@@ -96,32 +93,28 @@ def assemble(
     band[:] = 0.0
     left, right = np.empty((6, 6)), np.empty((6, 6))
     tangent, product = np.empty((6, 6)), np.empty((6, 6))
-    theta, sigma, unit, pulling = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    own, change, of_own = np.empty(6), np.empty(6), np.empty(6)  # epsilon_s, d epsilon_s / ds, sigma_s
+    theta, sigma, unit = np.empty(6), np.empty(6), np.empty(6)
     to_a, to_b = np.empty(6), np.empty(6)
     for e in range(n):
         for i in range(6):
             theta[i] = strain[e, i] * length[e]
         inverse_jacobians(theta, left, right)
-        s, rate, second = widened(strain[e], rest_strain[e], filament[e], curve[e], own, change)
-        _material(own, rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], of_own, tangent)
-        _add_curve(own, rest_strain[e], filament[e], curve[e], of_own, tangent)
-        add_across(own[3] - rest_strain[e, 3], own[4] - rest_strain[e, 4], across[e], of_own, tangent)
+        _material(
+            strain[e], rest_strain[e], linear[e], constant[e], slip_stiffness[e], slip_moment[e], slip_strain[e], sigma, tangent
+        )
+        _add_curve(strain[e], rest_strain[e], filament[e], curve[e], sigma, tangent)
         for c in range(m):
             if not routing.inside[c, e]:
                 continue
             here = tension[c] * share[c, e]
-            _add_tendon(here, here * length[e] / path[c, e], routing.offset[c, e], direction[c, e], unit, of_own, tangent)
-            to_strain(unit, filament[e], s, rate, change, pulling)
-            _to_sections(left, right, pulling, to_a, to_b)
+            _add_tendon(here, here * length[e] / path[c, e], routing.offset[c, e], direction[c, e], unit, sigma, tangent)
+            _to_sections(left, right, unit, to_a, to_b)
             for i in range(6):
                 if e > 0:
                     gradient[6 * (e - 1) + i, c] += to_a[i]
                     pull[6 * (e - 1) + i, c] += share[c, e] * to_a[i]
                 gradient[6 * e + i, c] += to_b[i]
                 pull[6 * e + i, c] += share[c, e] * to_b[i]
-        to_strain(of_own, filament[e], s, rate, change, sigma)
-        tangent_to_strain(of_own, tangent, filament[e], s, rate, second, change)
         _to_sections(left, right, sigma, to_a, to_b)
         for i in range(6):
             residual[e, i] += to_a[i]

@@ -10,11 +10,7 @@ A filament along the robot is a bar that may contract across. Its force over its
     Yeoh, incompressible             P = 2 (c10 + 2 c20 (I1 - 3) + ...) (l - l^-2)   c = -1,  d = 4/3 + 6 c20 / c10
 
 because I1 - 3 = 3 e^2 + ... (L. R. G. Treloar, The Physics of Rubber Elasticity, 1975). For any Poisson's ratio, and with fibres,
-whose stress is added, c and d are found from the law itself; E is then that along the axis. So is the width of the bar,
-
-    s(e) = exp(a e + q e^2),    a = -nu without fibres,    neo-Hookean, incompressible: s = l^(-1/2), a = -1/2, q = 1/4
-
-which widening.py uses: where fibres are wound about the axis, s is the contraction around it.
+whose stress is added, c and d are found from the law itself; E is then that along the axis.
 
 St. Venant-Kirchhoff's law folds in strong compression, which no material does. The slope of P stays where it has fallen to a
 quarter of E.
@@ -40,8 +36,8 @@ _LEAST_SLOPE = 0.25  # of Young's modulus
 _ROUNDS = 20  # of Newton's method; it takes five
 
 
-def curve_of_law(material: Material) -> tuple[float, float, float, float, float]:
-    """Return c, d, the strain in compression from which on the slope stays, a, and q; see the module's text."""
+def curve_of_law(material: Material) -> tuple[float, float, float]:
+    """Return c, d, and the strain in compression from which on the slope stays; see the module's text."""
     own = tuple(getattr(material, name) for name in LAWS[material.law].own_constants)
     fibres = material.fibres
     wound = (0.0, 0.0) if fibres is None else (fibres.ratio, fibres.angle)
@@ -62,24 +58,20 @@ def filaments(axial: np.ndarray) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=64)
-def _curve(
-    law: str, nu: float, own: tuple[float, ...], wound: tuple[float, float], along: float
-) -> tuple[float, float, float, float, float]:
+def _curve(law: str, nu: float, own: tuple[float, ...], wound: tuple[float, float], along: float) -> tuple[float, float, float]:
     """See `curve_of_law`. wound: ratio of the fibres, and their angle (rad); along: modulus along the axis over Young's."""
     constants = np.array([nu / ((1 + nu) * (1 - 2 * nu)), 1 / (2 * (1 + nu)), *own])  # of Young's modulus 1
     ratio, angle = wound
     fibres = math.sqrt(ratio) * np.array([[0.0, math.sin(angle) ** 2, math.cos(angle) ** 2, 0.0, 0.0, 0.0]])
-    pulled, pressed = (_bar(LAWS[law].code, constants, fibres, sign * _STEP) for sign in (1.0, -1.0))
-    longer, shorter = pulled[0] / along, pressed[0] / along
+    longer, shorter = (_force(LAWS[law].code, constants, fibres, sign * _STEP) / along for sign in (1.0, -1.0))
     c, d = (longer + shorter) / (2.0 * _STEP**2), ((longer - shorter) / 2.0 - _STEP) / _STEP**3
     compressed = -np.arange(0.0, 1.0, 0.001)
     folding = np.flatnonzero(1.0 + 2.0 * c * compressed + 3.0 * d * compressed**2 < _LEAST_SLOPE)
-    a, q = (pulled[1] - pressed[1]) / (2.0 * _STEP), (pulled[1] + pressed[1]) / (2.0 * _STEP**2)
-    return c, d, float(compressed[folding[0]]) if len(folding) else -1.0, a, q
+    return c, d, float(compressed[folding[0]]) if len(folding) else -1.0
 
 
-def _bar(law: int, constants: np.ndarray, fibres: np.ndarray, strain: float) -> tuple[float, float]:
-    """P over Young's modulus and log s at the strain e of a bar with nothing on its sides; fibres (f, 6): see `materials.fibres`.
+def _force(law: int, constants: np.ndarray, fibres: np.ndarray, strain: float) -> float:
+    """P over Young's modulus at the strain e of a bar with nothing on its sides; fibres (f, 6): see `materials.fibres`.
 
     The directions are across the wall, around and along the axis. Newton's method for the two contractions.
     """
@@ -92,4 +84,4 @@ def _bar(law: int, constants: np.ndarray, fibres: np.ndarray, strain: float) -> 
         green[:2] -= change
         if np.abs(change).max() < 1e-15:
             break
-    return (1.0 + strain) * float(s[2]), 0.5 * math.log1p(2.0 * float(green[1]))
+    return (1.0 + strain) * float(s[2])

@@ -23,8 +23,7 @@ class RodModel:
     length: np.ndarray  # (n,) m, at rest
     stiffness: np.ndarray  # (n, 6, 6) symmetric; shear, shear, stretch (N); bending, bending, torsion (N m^2); couplings (N m)
     filament: np.ndarray  # (n, 9, 3) y and -x (m), E times area (N): see law_curve.py
-    curve: np.ndarray  # (n, 5) of the law in them: c, d, the strain from which on the slope stays; a and q of its widening
-    across: np.ndarray  # (n, 8) of the energy of filaments that move across, see widening.py
+    curve: np.ndarray  # (n, 3) c and d of the law in them, and the strain from which on the slope stays
     rest_strain: np.ndarray  # (n, 6) of the unloaded rod: (0, 0, 1, curvature, curvature, 0)
     mass: np.ndarray  # (n + 1,) kg, lumped in the cross-sections
     centre: np.ndarray  # (n + 1, 3) m, centre of that mass, along the axes of the cross-section

@@ -39,7 +39,6 @@ from gravcomp.virtual.routing import Routing, tendon_lengths
 from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
 from gravcomp.virtual.surface import RodSurface
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
-from gravcomp.virtual.widening import widened_strains
 
 _SPECTRAL_RADIUS = 0.5  # numerical damping of frequencies that the time step cannot resolve; 1: none
 _ALPHA_M = (2 * _SPECTRAL_RADIUS - 1) / (_SPECTRAL_RADIUS + 1)
@@ -81,7 +80,6 @@ def time_step(
     stiffness: np.ndarray,
     filament: np.ndarray,
     curve: np.ndarray,
-    across: np.ndarray,
     rest_strain: np.ndarray,
     mass: np.ndarray,
     centre: np.ndarray,
@@ -123,9 +121,7 @@ def time_step(
     caller sets the rest of the state.
     """
     n, m = length.shape[0], tendon_rest.shape[0]
-    own_strain = np.empty((n, 6))  # of the material
-    widened_strains(strain, rest_strain, filament, curve, own_strain)
-    linear, constant = step_law(dt, stiffness, rest_strain, own_strain, branch_strain, branch_ratio, branch_time, damping_time)
+    linear, constant = step_law(dt, stiffness, rest_strain, strain, branch_strain, branch_ratio, branch_time, damping_time)
     force = np.empty((n + 1, 3))
     for k in range(n + 1):
         for i in range(3):
@@ -176,8 +172,7 @@ def time_step(
             _restart(gamma, beta, total_increment, velocity, velocity_rate)
         _move(total_increment, start_orientation, start_position, orientation, position, turn, shift, work)
         strains(orientation, position, length, new_strain)
-        widened_strains(new_strain, rest_strain, filament, curve, own_strain)
-        tendon_lengths(orientation, position, own_strain, length, routing, direction, chord, path)
+        tendon_lengths(orientation, position, new_strain, length, routing, direction, chord, path)
         slack = 0.0  # largest stretch of a taut tendon that has become too short
         for c in range(m):
             stretch = wound[c] + np.sum(path[c]) - tendon_rest[c]
@@ -195,7 +190,6 @@ def time_step(
             constant,
             filament,
             curve,
-            across,
             slip_stiffness,
             slip_moment,
             slip_strain,
@@ -282,7 +276,7 @@ def time_step(
         return False, False
     if obstacles > 0:
         keep_friction(walls, orientation, touching, held)
-    update_history(dt, own_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
+    update_history(dt, new_strain, branch_strain, slip_strain, branch_time, slip_stiffness, slip_moment)
     update_sliding(sliding, path_before, path, wound_before, wound, presliding)
     for c in range(m):
         shortened[c] = tendon_rest[c] - np.sum(path[c])
