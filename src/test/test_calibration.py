@@ -135,19 +135,6 @@ def test_only_the_last_still_window_of_a_stretch_counts():
         still_windows(moving, STILL)
 
 
-def test_windows_keep_the_whole_way_of_the_tip():
-    """Of two trials; the samples of each window have its mean."""
-    again = dataclasses.replace(course(), trial=np.ones(60, int), tip_position=course().tip_position + np.array([0.0, 1e-3, 0.0]))
-    both = {name: np.concatenate([getattr(one, name) for one in (course(), again)]) for name in ("trial", "time", "gravity")}
-    tips = {name: np.concatenate([getattr(one, name) for one in (course(), again)]) for name in ("displacement", "tip_position")}
-    windows = still_windows(Measured("here", **both, **tips), STILL)
-    found = windows.history.course
-    assert found.begins.nonzero()[0].tolist() == [0, 60] and not found.tip[:, 3:].any()  # no direction was measured
-    np.testing.assert_array_equal(found.tip[:, :3], tips["tip_position"])
-    np.testing.assert_allclose(found.window_means(found.tip)[:, :3], windows.tip_position, atol=1e-12)
-    assert [len(rows) for rows in found.windows] == [10, 10] and (found.windows[1] >= 60).all()
-
-
 def test_csv_is_read_as_it_was_written(tmp_path, robot):
     path = tmp_path / "tips.csv"
     written = dataclasses.replace(course(), specific_force=9.8 + 0.001 * np.arange(60))

@@ -11,11 +11,9 @@ import pytest
 from gravcomp.calibration import planning, pose_candidates
 from gravcomp.calibration.approach import APPROACH, approached, as_pulled
 from gravcomp.calibration.files import read_measured
-from gravcomp.calibration.fit import fit_statics
 from gravcomp.calibration.force_length import length_rows
 from gravcomp.calibration.live import LiveSession, Phase
 from gravcomp.calibration.measured import MeasurementError, still_windows
-from gravcomp.calibration.parameters import starting_parameters
 from gravcomp.calibration.plan import Plan, PlannedPose, PlanOptions, gravity_of
 from gravcomp.calibration.plan_file import load_plan, save_plan
 from gravcomp.calibration.plan_table import is_plan_table, pulls, read_plan_table, write_plan_table
@@ -32,7 +30,7 @@ from gravcomp.mesh.body import body_mesh
 from gravcomp.mesh.coarse import with_coarse_elements
 from gravcomp.mesh.tube import coarse_elements
 from gravcomp.trials.calibration_run import run_plan
-from gravcomp.trials.coverage import RARE, LinearRobot, counted, coverage
+from gravcomp.trials.coverage import RARE, counted, coverage
 
 PERIOD = 0.3  # s
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -317,23 +315,6 @@ def test_intervals_cover_the_truth_of_drawn_robots(robot, plan):
     assert counted > 50 and inside / counted >= 0.9
     assert found["modulus"].share >= 0.9
     assert all(np.isfinite(one.width) and one.count >= 5 for one in found.values())
-
-
-def test_a_fit_finds_the_strain_at_which_friction_inside_the_material_slips(robot, plan):
-    """Of a robot whose friction slips at 30 % more: held to the strain of its class, the fit takes that for more friction."""
-    linear = LinearRobot(with_coarse_elements(robot), plan)
-    true = dataclasses.replace(starting_parameters(linear.robot, ()), slip=0.04, reach=1.3)
-    linear.measure(linear.predict(true).tip)
-    error = {}
-    for spread in (1e-6, 0.3):
-        priors = Priors(reach=spread)
-        fit = fit_statics(
-            linear.robot, linear.windows, groups={"creep"}, creep_times=linear.times, predictor=linear, priors=priors
-        )
-        found = {estimate.kind: estimate for estimate in fit.estimates}
-        error[spread] = abs(found["slip"].value - 0.04)
-    assert found["reach"].value == pytest.approx(1.3, abs=0.1) and abs(found["reach"].value - 1.3) < found["reach"].interval
-    assert error[0.3] < 0.3 * error[1e-6] and error[0.3] < found["slip"].interval
 
 
 def test_kinds_that_few_seeds_tell_are_counted_together():

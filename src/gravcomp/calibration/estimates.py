@@ -58,7 +58,6 @@ def name_of(robot: Robot, unknown: Unknown, times: tuple[float, ...] = ()) -> st
     names = {
         "winding": "winding ratio", "density": "density ratio", "payload": "payload ratio",
         "friction": "friction beyond the described one", "slip": "friction inside the material",
-        "reach": "strain at which that friction slips, ratio",
         "mount": f"mount of the IMU about {'xyz'[min(first, 2)]}",
         "bias": f"bias of the accelerometer along {'xyz'[min(first, 2)]}",
     }  # fmt: skip

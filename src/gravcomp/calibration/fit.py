@@ -56,7 +56,7 @@ class TipNoise:
         description="error of the stiffness that no fit sees, relative: inner friction, the law at small strain",
     )
     creep: float = parameter(
-        0.35,
+        0.45,
         minimum=0.0,
         maximum=2.0,
         description="error of a branch of creep that no fit sees, relative: bodies creep by other times than the branches",

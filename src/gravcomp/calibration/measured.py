@@ -66,35 +66,17 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Course:
-    """Where the measured tips went, in the order of time within each trial.
-
-    tip (t, 6): position in m and direction, zero where none was measured; begins (t,): whether a trial begins with the sample;
-    windows: the samples of each of the k windows.
-    """
-
-    tip: np.ndarray
-    begins: np.ndarray
-    windows: tuple[np.ndarray, ...]
-
-    def window_means(self, values: np.ndarray) -> np.ndarray:
-        """Return the means (k, n) over the samples of each window, of values (t, n)."""
-        return np.array([values[rows].mean(axis=0) for rows in self.windows])
-
-
-@dataclass(frozen=True)
 class History:
     """When k windows were, in the order of time within each trial.
 
     trial (k,); began (k,) in s: since when gravity and cables are as in the window; time (k,) in s: of its middle; starts: of the
-    trials, by number; course: of the tips in and between the windows.
+    trials, by number.
     """
 
     trial: np.ndarray
     began: np.ndarray
     time: np.ndarray
     starts: dict[int, Start]
-    course: Course
 
 
 @dataclass(frozen=True)
@@ -121,10 +103,8 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
     parts: windows of each rest, equally long in the logarithm of the time since cables and base came to rest, because a body
     creeps by such times; with one it is the last window of the rest. Raises MeasurementError if there is none.
     """
-    found: list[tuple] = []
-    samples: list[np.ndarray] = []  # of each window
-    starts, trials, before = {}, measured.trials(), 0
-    for trial in trials:
+    found, starts = [], {}
+    for trial in measured.trials():
         number = int(trial.trial[0])
         starts[number] = Start(float(trial.time[0]), trial.gravity[0], trial.displacement[0])
         for first, last in rests_of(trial, still):
@@ -132,8 +112,8 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             pieces = _pieces(trial, began, first, last, still, parts)
             for rows in pieces:
                 window = trial.rows(rows)
-                samples.append(before + rows)
                 direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
+                force = _mean_of_measured(window.specific_force)
                 found.append(
                     (
                         *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
@@ -142,22 +122,20 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
                         trial.time[began],
                         window.time.mean(),
                         1.0 / len(pieces),
-                        _mean_of_measured(window.specific_force),
+                        force,
                     )
                 )
-        before += len(trial.time)
     if not found:
         raise MeasurementError(
             f"{measured.source}: the robot is never at rest for {still.time:.2g} s (tip within {1e3 * still.tip:.2g} mm,"
             f" cables within {1e3 * still.cable:.2g} mm: from its first period and its length); let it settle in a few poses"
         )
-    gravity, displacement, tip, direction, numbers, since, middle, share, force = (np.array(column) for column in zip(*found))
+    gravity, displacement, tip, direction, trials, since, middle, share, force = (np.array(column) for column in zip(*found))
     directed = measured.tip_direction is not None and np.ptp(measured.tip_direction, axis=0).max() > 0.0
     # A tracker of positions alone publishes one and the same orientation.
     unit = direction / np.linalg.norm(direction, axis=1, keepdims=True) if directed else None
     forces = None if measured.specific_force is None else force
-    history = History(numbers, since, middle, starts, _course_of(trials, tuple(samples)))
-    return StillWindows(gravity, displacement, tip, unit, history, share, forces)
+    return StillWindows(gravity, displacement, tip, unit, History(trials, since, middle, starts), share, forces)
 
 
 def rests_of(trial: Measured, still: Standstill) -> list[tuple[int, int]]:
@@ -216,13 +194,6 @@ def _is_still(window: Measured, still: Standstill, limit: float) -> bool:
     direction = window.gravity / np.linalg.norm(window.gravity, axis=1, keepdims=True)
     turned = np.ptp(direction, axis=0).max() <= still.gravity
     return bool(spread and same and cables and turned)
-
-
-def _course_of(trials: list[Measured], windows: tuple[np.ndarray, ...]) -> Course:
-    """Return the course of trials one after the other, with the samples of its windows."""
-    directions = [np.zeros_like(one.tip_position) if one.tip_direction is None else one.tip_direction for one in trials]
-    tip = np.concatenate([np.hstack([one.tip_position, direction]) for one, direction in zip(trials, directions)])
-    return Course(tip, np.concatenate([np.arange(len(one.time)) == 0 for one in trials]), windows)
 
 
 def _mean_of_measured(values: np.ndarray | None) -> float:

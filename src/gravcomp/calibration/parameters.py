@@ -20,8 +20,7 @@ class StaticParameters:
     density and payload: over the described ones; bias (3,) in m/s^2: of the measured specific force, along the axes of soft_base
     as the mount is described; mount (3,): rotation vector in rad that turns measured gravity without the bias into the true one;
     creep (b,): stiffness of each branch over the long-term one; friction: added to the coefficient of every cable; slip:
-    stiffness of the friction inside the material over the long-term one, and reach: strain at which it slips over that of the
-    material's class (`held_back`).
+    stiffness of the friction inside the material over the long-term one (`held_back`).
     """
 
     youngs_modulus: np.ndarray
@@ -37,7 +36,6 @@ class StaticParameters:
     creep: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
     friction: float = 0.0
     slip: float = 0.0
-    reach: float = 1.0
 
     def __post_init__(self) -> None:
         for name in ("radius", "angle"):

@@ -34,7 +34,7 @@ from gravcomp.mesh.coarse import with_coarse_elements
 
 _STEPS = {
     "modulus": 1e-2, "density": 1e-2, "payload": 1e-2, "mount": 1e-2, "bias": 0.1, "creep": 1e-2, "friction": 2e-2,
-    "radius": 5e-3, "angle": 5e-3, "reach": 5e-2,
+    "radius": 5e-3, "angle": 5e-3,
 }  # fmt: skip
 """Steps of the difference quotients, in the units of `StaticParameters`; of the modulus: of its logarithm."""
 
@@ -82,14 +82,13 @@ class StaticPredictor:
         self._coarse: StaticPredictor | None = None
         self._creep_times = creep_times
         self._tips: dict[bytes, np.ndarray] = {}  # of `tips_of`, by gravity and displacements
-        self._held: dict[float, np.ndarray] = {}  # of `held_back`, by reach
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the prediction for all windows. Raises RuntimeError if there is no equilibrium."""
         shown = [step for step in self._walked(parameters) if step.window is not None]
         tip = np.array([step.tip for step in shown])
         if parameters.slip:
-            tip = tip - parameters.slip * self.held_back(parameters)
+            tip = tip - parameters.slip * self._held_back(parameters)
         return StaticPrediction(tip, np.array([step.tension for step in shown]))
 
     def tips_of(self, displacement: np.ndarray) -> np.ndarray:
@@ -126,10 +125,7 @@ class StaticPredictor:
         shown = [step for step in steps if step.window is not None]
         found = self._by_forces(parameters, shown) if kinds & _FORCES else {}
         found |= {kind: self._differences(parameters, kind, steps, shown) for kind in _WALKED if kind in kinds - found.keys()}
-        here = self.held_back(parameters)
-        farther = self.held_back(parameters.changed("reach", (0,), _STEPS["reach"]))
-        found["slip"] = -here[:, :, None]
-        found["reach"] = -parameters.slip * (farther - here)[:, :, None] / _STEPS["reach"]
+        found["slip"] = -self._held_back(parameters)[:, :, None]
         by_offset = np.array([step.by_offset for step in shown])
         wound = np.nan_to_num(np.array([self.windows.displacement[step.window] for step in shown]))
         found["offset"] = by_offset
@@ -141,23 +137,18 @@ class StaticPredictor:
                 found[kind] = self._by_place(parameters, kind, shown)
         return found
 
-    def held_back(self, parameters: StaticParameters) -> np.ndarray:
-        """Return (k, 6) by what the tips of the windows stay behind, for a friction as stiff as the body."""
-        if self.windows.history is None:
-            return np.zeros((len(self.windows.gravity), 6))
-        if parameters.reach not in self._held:
-            reach = parameters.reach * reach_of(self._robot, self._model)
-            self._held[parameters.reach] = held_back(self.windows.history.course, reach, self._robot.length)
-        return self._held[parameters.reach]
-
     def _walked(self, parameters: StaticParameters) -> list[Step]:
         """Return the steps at the parameters; those of the last call are kept."""
-        key = dataclasses.replace(parameters, slip=0.0, reach=1.0).key  # friction inside the material changes no step
+        key = parameters.key
         if self._last is None or self._last[0] != key:
             self._apply(parameters)
             known = self._last[1] if self._last else self._near
             self._last = key, self._walk.run(self._inputs(parameters), parameters.creep, known)
         return self._last[1]
+
+    def _held_back(self, parameters: StaticParameters) -> np.ndarray:
+        """Return (k, 6) by what the tips of the windows stay behind, for a friction as stiff as the body."""
+        return held_back(self._walked(parameters), reach_of(self._robot, self._model), self._robot.length)
 
     def _inputs(self, parameters: StaticParameters, steps: list[Step] | None = None) -> list[Step]:
         """Return the steps (None: its own) with the gravity and displacements that the parameters make of the measured ones."""

@@ -22,7 +22,7 @@ GROUPS = {
     "weight": ("density", "payload"),
     "mount": ("mount",),
     "bias": ("bias",),
-    "creep": ("creep", "slip", "reach"),
+    "creep": ("creep", "slip"),
     "friction": ("friction",),
 }
 """What may be fitted in addition to the moduli, and the kinds of unknowns that it means."""
@@ -59,9 +59,6 @@ class Priors:
     slip: float = parameter(
         0.5, minimum=1e-6, maximum=100.0, description="error of the friction inside the material, over that of its class"
     )
-    reach: float = parameter(
-        0.3, minimum=1e-6, maximum=100.0, description="error of the strain at which that friction slips, over that of its class"
-    )
     friction: float = parameter(0.05, minimum=1e-6, maximum=1.0, description="error of the cables' coefficient of friction")
 
 
@@ -82,7 +79,7 @@ class Unknown:
         """Return the lower bound in x."""
         if self.kind == "modulus":
             return float(np.log(MODULUS_RANGE[0]))
-        if self.kind in ("compliance", "creep", "friction", "slip", "reach"):  # none of them is below zero
+        if self.kind in ("compliance", "creep", "friction", "slip"):  # none of them is below zero
             return -float(initial.values(self.kind)[list(self.index)].min()) / self.scale
         return -_FARTHEST
 
@@ -102,7 +99,7 @@ def unknowns_of(
 
     They are the moduli, first; of `groups` (None: all `GROUPS`): offset, place, winding of the cables that are taut in a window,
     one compliance for all cables of a segment with a taut cable, density, payload, mount, bias of the accelerometer, branches of
-    creep, friction inside the material and the strain at which it slips, friction of the cables.
+    creep and friction inside the material, friction of the cables.
     """
     wanted = set(GROUPS) if groups is None else groups
     taut = [c for c in range(len(robot.cables)) if (before.tension[:, c] > _TAUT * robot.limits.tension_max).any()]
@@ -131,8 +128,7 @@ def unknowns_of(
         usual = class_of(robot.materials[0].youngs_modulus)
         scale = priors.creep * max(usual.creep_ratio)
         unknowns += [Unknown("creep", (b,), scale) for b in range(len(initial.creep))]
-        if len(initial.creep):
-            unknowns += [Unknown("slip", (0,), priors.slip * usual.slip), Unknown("reach", (0,), priors.reach)]
+        unknowns += [Unknown("slip", (0,), priors.slip * usual.slip)] * bool(len(initial.creep))
     if "friction" in wanted and taut:
         unknowns.append(Unknown("friction", (0,), priors.friction))
     return unknowns

@@ -18,8 +18,7 @@ import numpy as np
 from gravcomp.calibration.approach import as_pulled
 from gravcomp.calibration.estimates import edge_unit
 from gravcomp.calibration.fit import TipNoise, body_mass, fit_statics
-from gravcomp.calibration.held_back import held_back, reach_of
-from gravcomp.calibration.measured import Course, History, Start, StillWindows
+from gravcomp.calibration.measured import History, Start, StillWindows
 from gravcomp.calibration.parameters import StaticParameters, creep_in_branches, starting_parameters
 from gravcomp.calibration.plan import Plan, creep_times
 from gravcomp.calibration.planning import make_plan
@@ -28,7 +27,6 @@ from gravcomp.calibration.unknowns import GROUPS
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot, load_robot_file
 from gravcomp.full_model.modes import first_period
-from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.materials.material_classes import class_of
 from gravcomp.mesh.coarse import with_coarse_elements
 
@@ -45,9 +43,7 @@ _EVEN = {
 """Half widths of the even distributions of what is drawn, in the units of `StaticParameters`; the modulus in its logarithm."""
 
 _LINE, _ZERO, _FRICTION = 0.1, 2e-3, 0.1  # stretch, relative; zero of a cable, over the length; coefficient of friction
-_CREEP = 0.3  # of the ratios of a class, of its friction and of the strain at which that slips, relative
-_INSIDE = ("slip", "reach")  # friction inside the material: its two numbers multiply each other
-_STEP = 0.05  # of the difference quotient by the reach
+_CREEP = 0.3  # of the ratios of a class, and of its friction, relative
 _TIMES = (0.5, 1.0, 2.0)  # factors of the times of a class, of which each branch has one
 _WINDOWS = 3  # of each rest
 _FIRST = 0.1  # of a rest: the beginning of its first window
@@ -73,7 +69,7 @@ def coverage(robot: Robot, plan: Plan, seeds: Sequence[int]) -> dict[str, Covere
     """
     noise = TipNoise()
     robot = with_coarse_elements(robot)
-    linear = LinearRobot(robot, plan)
+    linear = _Linear(robot, plan)
     body, payload, rest = body_mass(robot)
     errors: dict[str, list[float]] = {}
     halves: dict[str, list[float]] = {}
@@ -134,7 +130,6 @@ def drawn(robot: Robot, random: np.random.Generator) -> StaticParameters:
         found = found.changed("compliance", (cable,), float((stretch - 1.0) * found.compliance[cable]))
     usual = class_of(robot.materials[0].youngs_modulus)
     found = found.changed("slip", (0,), float(usual.slip * (1.0 + _CREEP * random.uniform(-1.0, 1.0))))
-    found = found.changed("reach", (0,), float(_CREEP * random.uniform(-1.0, 1.0)))
     return found.changed("friction", (0,), float(_FRICTION * random.uniform(0.0, 1.0)))
 
 
@@ -158,14 +153,14 @@ def _drawn_branches(robot: Robot, random: np.random.Generator) -> np.ndarray:
     return (ratio[:, None] * factors * (1.0 + _CREEP * random.uniform(-1.0, 1.0))).ravel()
 
 
-class LinearRobot:
+class _Linear:
     """The model of a robot in the windows of a plan, linearised at the description without creep.
 
-    robot: that robot; windows: what was measured last; times: of the branches of creep that are fitted, in s.
+    windows: what was measured last; times: of the branches of creep that are fitted, in s.
     """
 
     def __init__(self, robot: Robot, plan: Plan):
-        self.robot, self.times = robot, creep_times(plan.rest)
+        self.times = creep_times(plan.rest)
         self._true_times = _true_times(robot)
         self.windows = _windows(plan)
         # The fit's branches, and after them the true ones.
@@ -174,9 +169,6 @@ class LinearRobot:
         self._start = dataclasses.replace(start, creep=np.zeros_like(start.creep))
         self._here = predictor.predict(self._start)
         self._slopes = predictor.differentiate(self._start, _KINDS)
-        # A course through the windows' tips only: this robot does not swing.
-        self._course = dataclasses.replace(_course_of(len(self._here.tip)), tip=self._here.tip)
-        self._reach = reach_of(robot, RobotModel(robot))
 
     def measure(self, tip: np.ndarray) -> None:
         """Set the measured tips (k, 6) of the windows."""
@@ -192,30 +184,16 @@ class LinearRobot:
 
     def predict(self, parameters: StaticParameters) -> StaticPrediction:
         """Return the tips at the parameters, to first order; of their creep by the branches that are fitted."""
-        tip = self._here.tip - parameters.slip * self._held_back(parameters)
+        tip = self._here.tip.copy()
         for kind, slopes in self._slopes.items():
-            if kind in _INSIDE:
-                continue
             there = parameters.values(kind)
             start = self._start.values(kind)[: len(there)]
             tip += slopes[:, :, : len(there)] @ (np.log(there / start) if kind == "modulus" else there - start)
         return StaticPrediction(tip, self._here.tension)
 
     def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
-        """Return the derivatives at the description; by friction inside the material, at the parameters."""
-        here = self._held_back(parameters)
-        farther = self._held_back(parameters.changed("reach", (0,), _STEP))
-        by_reach = -parameters.slip * (farther - here) / _STEP
-        return self._slopes | {"slip": -here[:, :, None], "reach": by_reach[:, :, None]}
-
-    def _held_back(self, parameters: StaticParameters) -> np.ndarray:
-        """Return (k, 6) by what the described tips stay behind, for the reach of the parameters."""
-        return held_back(self._course, parameters.reach * self._reach, self.robot.length)
-
-
-def _course_of(count: int) -> Course:
-    """Return a course of as many samples as windows, in which the tip does not move."""
-    return Course(np.zeros((count, 6)), np.arange(count) == 0, tuple(np.arange(count)[:, None]))
+        """Return the derivatives at the description."""
+        return self._slopes
 
 
 def _windows(plan: Plan) -> StillWindows:
@@ -232,7 +210,7 @@ def _windows(plan: Plan) -> StillWindows:
         displacement,
         np.zeros((len(each), 3)),
         np.zeros((len(each), 3)),
-        History(np.zeros(len(each), int), (ends - plan.rest)[each], middles.ravel(), {0: start}, _course_of(len(each))),
+        History(np.zeros(len(each), int), (ends - plan.rest)[each], middles.ravel(), {0: start}),
         np.full(len(each), 1.0 / _WINDOWS),
     )
 
