@@ -113,7 +113,7 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
             for rows in pieces:
                 window = trial.rows(rows)
                 direction = np.zeros(3) if window.tip_direction is None else window.tip_direction.mean(axis=0)
-                force = _mean_of_measured(window.specific_force)
+                length = _mean_of_measured(window.specific_force)
                 found.append(
                     (
                         *(part.mean(axis=0) for part in (window.gravity, window.displacement, window.tip_position)),
@@ -122,7 +122,7 @@ def still_windows(measured: Measured, still: Standstill, parts: int = 1) -> Stil
                         trial.time[began],
                         window.time.mean(),
                         1.0 / len(pieces),
-                        force,
+                        length,
                     )
                 )
     if not found:
