@@ -95,15 +95,20 @@ def _round(robot: Robot) -> bool:
     return plain and all(outline.round for outline in outlines)
 
 
+def _places(robot: Robot, target: Target) -> np.ndarray:
+    """Return the target as points (k, 3), those of tip and backbone over the robot's length."""
+    return np.vstack([target.tip_position / robot.length, target.direction_or_zeros, target.backbone_position / robot.length])
+
+
 def _stays(robot: Robot, target: Target, matrix: np.ndarray) -> bool:
     """Whether a matrix (3, 3) maps the target onto itself."""
-    places = np.vstack([target.tip_position / robot.length, target.direction_or_zeros, target.backbone_position / robot.length])
+    places = _places(robot, target)
     return bool((np.abs(places @ matrix.T - places) < _SAME).all())
 
 
 def _on_axis(robot: Robot, target: Target) -> bool:
     """Whether all of the target lies on the axis."""
-    places = np.vstack([target.tip_position / robot.length, target.direction_or_zeros, target.backbone_position / robot.length])
+    places = _places(robot, target)
     return bool((np.abs(places[:, :2]) < _SAME).all())
 
 
