@@ -15,8 +15,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped, QuaternionStamped
 from gravcomp_node.managed_node import OK
 from gravcomp_node.polled import Polled
+from gravcomp_node.repeated_call import RepeatedCall
 from rclpy.qos import QoSProfile
-from rclpy.task import Future
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
@@ -36,7 +36,6 @@ from gravcomp_node import COMMAND, LATCHED, SENSOR, ManagedNode, run
 _RATE = 50.0  # Hz, of joint_states
 _LONGEST_MOTION = 2.5 / _RATE  # s, by which the tour goes on between two messages
 _PASSES = ("released", "compensated")
-_REPEAT_REQUEST = 1.0  # s, until a refused or unanswered request is repeated
 
 
 class ArmPlayer(ManagedNode):
@@ -68,8 +67,8 @@ class ArmPlayer(ManagedNode):
         self._moved: float | None = None  # s, the last motion of the pass; None: it has not begun
         self._time = 0.0  # s, since the start of the pass
         self._pass = 0
-        self._accepted = self._measuring = False
-        self._requested = -_REPEAT_REQUEST
+        self._measuring = False
+        self._begins = (RepeatedCall(self._relax, Trigger.Request()), RepeatedCall(self._enable, SetBool.Request(data=True)))
         self._phase = ""
         self._tip: np.ndarray | None = None
         self._bridge: CableState | None = None
@@ -95,7 +94,7 @@ class ArmPlayer(ManagedNode):
         time = 0.0 if self._moved is None else self._time + min(max(now - self._moved, 0.0), _LONGEST_MOTION)
         self._time = time
         if time >= self._tour.duration:
-            self._pass, self._moved, self._accepted, self._measuring, time = self._pass + 1, None, False, False, 0.0
+            self._pass, self._moved, self._measuring, time = self._pass + 1, None, False, 0.0
             if self._pass == len(_PASSES):
                 self._write("done", self._figures())
                 self.finished = True
@@ -128,26 +127,14 @@ class ArmPlayer(ManagedNode):
         self._ready = now if self._ready is None else self._ready
         if now - self._ready < self.parameters.wait:
             self._set_phase("at rest")
-        elif not self._accepted:
-            self._request_pass(now)
+        elif not self._begins[self._pass].succeeds():
+            refusal = self._begins[self._pass].refusal
+            self._set_phase(f"waiting for the controller: {refusal}" if refusal else "waiting for the controller")
         elif self._bridge.state != CableState.ACTIVE:
             self._set_phase(f"waiting for the bridge: {self._bridge.message}")
         else:
             self._moved = now
             self._set_phase(_PASSES[self._pass])
-
-    def _request_pass(self, now: float) -> None:
-        if now - self._requested < _REPEAT_REQUEST:
-            return
-        self._requested = now
-        client, request = (self._relax, Trigger.Request()) if self._pass == 0 else (self._enable, SetBool.Request(data=True))
-        client.call_async(request).add_done_callback(self._on_answer)
-
-    def _on_answer(self, future: Future) -> None:
-        answer = future.result()
-        self._accepted = answer.success
-        if not answer.success:
-            self._set_phase(f"waiting for the controller: {answer.message}")
 
     def _move(self, positions: np.ndarray) -> None:
         joints = JointState(name=list(self._chain.moving), position=positions.tolist())

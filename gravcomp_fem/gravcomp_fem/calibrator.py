@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.managed_node import OK, WARN
-from rclpy.task import Future
+from gravcomp_node.repeated_call import RepeatedCall
 from sensor_msgs.msg import Imu
 from std_srvs.srv import SetBool
 
@@ -29,7 +29,6 @@ from gravcomp_msgs.msg import CableCommand, CableState
 from gravcomp_node import COMMAND, SENSOR, ManagedNode, run
 
 _PERIOD = 0.1  # s, between two looks at the state
-_ANSWER = 5.0  # s: a controller that has not answered by then is asked again
 _RETRY = 1.0  # s, between two attempts to write
 
 
@@ -55,10 +54,9 @@ class Calibrator(ManagedNode):
     def activate(self) -> None:
         """Stop the controller, and subscribe."""
         self._present: np.ndarray | None = None
-        self._shown, self._stopped, self._refusal = "", False, ""
-        self._controller = self.create_client(SetBool, "inverse_controller/enable")
-        self._asked: Future | None = None
-        self._asked_at, self._written_at = 0.0, 0.0
+        self._shown, self._written_at = "", 0.0
+        self._stop = RepeatedCall(self.create_client(SetBool, "inverse_controller/enable"), SetBool.Request(data=False))
+        self._stopped = False
         self._inputs = [
             self.create_subscription(Vector3Stamped, "gravity", self._on_gravity, SENSOR),
             self.create_subscription(CableState, "cable/state", self._on_state, SENSOR),
@@ -109,11 +107,11 @@ class Calibrator(ManagedNode):
 
     def _show(self) -> None:
         """Stop the controller once it is there, write what to do, and end after the last pose."""
-        if not self._stopped:
-            self._stop_controller()
+        self._stopped = self._stop.succeeds()
         sentence = self._session.sentence()
         if not self._stopped:
-            sentence = self._refusal or "waiting for the controller, which is to stop"
+            refusal = self._stop.refusal
+            sentence = f"the controller does not stop: {refusal}" if refusal else "waiting for the controller, which is to stop"
         elif self._present is None:
             sentence = "waiting for cable/state: is the robot running?"
         now = self._now()
@@ -127,19 +125,6 @@ class Calibrator(ManagedNode):
                 self.get_logger().warning(sentence)
         self.report(OK if self._stopped and saved else WARN, sentence, finished=self._session.finished)
         self.finished = self._session.phase == Phase.DONE and saved
-
-    def _stop_controller(self) -> None:
-        """Ask the controller to stop, and again until it answers that it has."""
-        now = self._now()
-        if self._asked is not None and self._asked.done():
-            answer, self._asked = self._asked.result(), None
-            self._stopped = answer is not None and answer.success
-            self._refusal = "" if self._stopped or answer is None else f"the controller does not stop: {answer.message}"
-        elif self._asked is not None and now - self._asked_at > _ANSWER:
-            self._controller.remove_pending_request(self._asked)
-            self._asked = None
-        elif self._asked is None and now - self._asked_at > _RETRY and self._controller.service_is_ready():
-            self._asked, self._asked_at = self._controller.call_async(SetBool.Request(data=False)), now
 
     def _now(self) -> float:
         return self.get_clock().now().nanoseconds * 1e-9

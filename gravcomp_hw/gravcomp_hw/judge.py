@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Vector3Stamped
 from gravcomp_node.polled import Polled
+from gravcomp_node.repeated_call import RepeatedCall
 from lifecycle_msgs.srv import GetState
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.task import Future
@@ -51,7 +52,7 @@ class Judge(ManagedNode):
         self._imu, self._commands, self._by_full_model = Track(0), Track(0), Track(1)
         self._states: dict[str, str] = {}
         self._phase, self._begin, self._compensated_at = "waiting for the ground truth", None, None
-        self._pending = None
+        self._released = False  # the controller has answered that it pays the cables out
         self._target, self._direction = rest_tip(self.robot_file.robot)
         self._delay = DelayListener(self._can()) if self.parameters.measure_delay else None
 
@@ -73,10 +74,11 @@ class Judge(ManagedNode):
         self._status = Polled(self, ControllerStatus, "controller/status", LATCHED)
         self._deformation = Polled(self, Deformation, "robot/deformation", SENSOR)
         self._unholdable: str | None = None
-        self._relax = self.create_client(Trigger, "inverse_controller/relax")
-        self._enable = self.create_client(SetBool, "inverse_controller/enable")
-        self._stop = self.create_client(Trigger, "can_bridge/stop") if self.parameters.standalone else None
-        self._stopped: Future | None = None
+        self._relax = RepeatedCall(self.create_client(Trigger, "inverse_controller/relax"), Trigger.Request())
+        self._enable = RepeatedCall(self.create_client(SetBool, "inverse_controller/enable"), SetBool.Request(data=True))
+        self._stop = None
+        if self.parameters.standalone:
+            self._stop = RepeatedCall(self.create_client(Trigger, "can_bridge/stop"), Trigger.Request())
         self._state_clients = {name: self.create_client(GetState, f"{name}/get_state") for name in self.parameters.nodes}
         self.create_timer(0.1, self._run_scenario)
         self.create_timer(0.5, self._observe)
@@ -98,13 +100,13 @@ class Judge(ManagedNode):
                 raise ConfigError(f"no message on truth/tip for {p.start_timeout:g} s: is virtual_robot running on the same bus?")
             return
         elapsed = self._now() - self._begin
-        if self._phase == "waiting for the ground truth" and self._relax.service_is_ready():
-            self._phase = "sagging" if p.relax_time > 0.0 else self._phase
-            if p.relax_time > 0.0:
-                self._relax.call_async(Trigger.Request())
-        if elapsed >= p.relax_time and self._compensated_at is None and self._begins():
+        if not self._released:
+            self._released = p.relax_time == 0.0 or self._relax.succeeds()
+            self._phase = "sagging" if self._released and p.relax_time > 0.0 else "waiting for the controller"
+        if self._released and elapsed >= p.relax_time and self._compensated_at is None and self._begins():
             self._phase, self._compensated_at = "compensating", self._now()
         if elapsed >= p.duration:
+            self._check_compensated()
             self._phase = "done"
             self._write(self._figures())
             self.finished = True
@@ -112,19 +114,21 @@ class Judge(ManagedNode):
     def _begins(self) -> bool:
         """Begin compensation, of the controller or, once the bridge has stopped, of the board; return whether it has begun."""
         if self._stop is None:
-            if not self._enable.service_is_ready():
-                return False
-            self._enable.call_async(SetBool.Request(data=True))
-            return True
-        if self._stopped is None and self._stop.service_is_ready():
-            self._stopped = self._stop.call_async(Trigger.Request())
-        if self._stopped is None or not self._stopped.done():
+            return self._enable.succeeds()
+        if not self._stop.succeeds():
             return False
         with BoardClient(self._can()) as board:
             answer = board.ask(requests.act("run"))
         if not answer.done:
             raise ConfigError(f"the board does not run its loop: {answer.result}")
         return True
+
+    def _check_compensated(self) -> None:
+        """Raise ConfigError at the end of a run in which compensation has not begun: its figures would be those of the sag."""
+        if self._compensated_at is None and self.parameters.duration > self.parameters.relax_time:
+            call = (self._stop or self._enable) if self._released else self._relax
+            answer = f"the answer is '{call.refusal}'" if call.refusal else "the service has not answered"
+            raise ConfigError(f"compensation has not begun: {call.service}: {answer}")
 
     def _observe(self) -> None:
         """Query the lifecycle states and write the state of the run to the result file."""
