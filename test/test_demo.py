@@ -53,7 +53,8 @@ def check_compensation(figures: dict) -> None:
     # One command a sample. A loop that leaves out every second sample has half the rate, one on a slow machine a little less than
     # all; `bench graph` measures the rate.
     assert 0.52 * figures["imu_rate_hz"] < figures["command_rate_hz"] < 1.02 * figures["imu_rate_hz"]
-    assert figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.1)
+    # The virtual robot is a process as well: where it has not sent every sample in time, the demo says so.
+    assert figures["overloaded"] or figures["imu_rate_hz"] == pytest.approx(100.0, rel=0.1)
     # A wrong axis or sign gives tens of degrees. An overloaded machine sends frames late: 0.1 s are 5 deg of this motion.
     assert figures["gravity_error_deg"] < (2.0 if figures["overloaded"] is None else 10.0)
     assert figures["delay_ms"]["median"] > 0.0

@@ -1,6 +1,6 @@
 """A call of a service that is repeated until the service answers that it has succeeded.
 
-A single call is not enough: a node that has just been discovered, or restarted, can miss a request, and one that is inactive still
+A single call is not enough: a node that has just been discovered, or restarted, can miss a request, and one that is not active
 refuses it. Two requests that wait for a busy node are served in the order in which it has created its services, not in that of
 the calls: the second one is sent when the first one has been answered.
 """
