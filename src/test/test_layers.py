@@ -27,6 +27,10 @@ def test_a_mesh_at_the_largest_size_has_an_estimated_error(monkeypatch, tmp_path
     assert choice.error > mesh_choice.ACCURACY
 
 
+FOUR_AROUND = Segment("a", 0.08, section=Section("ellipse", 18e-3, 12e-3), material=Material(youngs_modulus=0.5e6))
+TUBE = Segment("a", 0.08, 10e-3, 4e-3, material=Material(youngs_modulus=0.5e6, poissons_ratio=0.45))
+
+
 class MadeUp(mesh_choice._Tips):
     """Tips that are made up: `size` is the change from one mesh to another. Nothing is meshed, and no work is counted."""
 
@@ -81,11 +85,50 @@ def test_the_choice_refines_around_before_cells_are_flat_and_ends_with_the_best_
             self.asked.append(one)
             return 0.01 * (1 + one.radial) if other.radial > one.radial else 1e-4 * (other.around > one.around)
 
-    segment = Segment("a", 0.08, section=Section("ellipse", 18e-3, 12e-3), material=Material(youngs_modulus=0.5e6))
-    choice = chosen_by(Climbing, segment, monkeypatch, tmp_path)
+    choice = chosen_by(Climbing, FOUR_AROUND, monkeypatch, tmp_path)
     assert max(one.radial for one in Climbing.asked) >= 3
     assert all(one.radial <= 0.5 * one.around for one in Climbing.asked)
     assert choice.elements.radial == min(one.radial for one in Climbing.asked)
+
+
+def by_power(change, one, other, order, direction):
+    """The change from one number of elements to another, of an error that is `change` at four and falls with a power."""
+    a, b = getattr(one, direction), getattr(other, direction)
+    return change * ((4 / a) ** order - (4 / b) ** order)
+
+
+def test_a_direction_with_a_small_part_of_the_error_is_not_refined_because_it_is_cheap(monkeypatch, tmp_path):
+    """A layer more costs little, but each mesh on the way to enough elements around has to be measured."""
+
+    class Around(MadeUp):
+        asked: ClassVar[set] = set()
+
+        def cost(self, elements):
+            return self.unknowns(elements) ** 3 / elements.along**2
+
+        def size(self, one, other):
+            self.asked.add(one.along)
+            return by_power(2.5e-3, one, other, 1.5, "around") + by_power(8e-4, one, other, 1.0, "along")
+
+    choice = chosen_by(Around, FOUR_AROUND, monkeypatch, tmp_path)
+    assert choice.error < mesh_choice.ACCURACY and Around.asked == {choice.elements.along}
+
+
+def test_what_cannot_be_measured_any_more_of_the_last_mesh_follows_from_coarser_ones(monkeypatch, tmp_path):
+    class Measured(MadeUp):
+        asked: ClassVar[list] = []
+
+        def work_of(self, elements):
+            return 2.0 * mesh_choice._MOST_WORK * (elements.around > 8)
+
+        def size(self, one, other):
+            self.asked.append((one.around, other.around))
+            return by_power(3.5e-3, one, other, 1.5, "around")
+
+    choice = chosen_by(Measured, TUBE, monkeypatch, tmp_path)
+    assert max(other for _, other in Measured.asked) == 8
+    assert choice.elements.around == 8
+    assert choice.error == pytest.approx(3.5e-3 * (1.0 - 0.5**1.5) * 0.5**1.5, rel=1e-6)
 
 
 def test_flat_cells_do_not_tell_the_error_of_cells_that_are_not(monkeypatch, tmp_path):

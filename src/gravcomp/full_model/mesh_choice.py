@@ -2,11 +2,13 @@
 
 The error of a mesh is the distance of its tip from that of a mesh twice as fine along, around and through the wall, under the
 loads of `mesh_loads`. It is estimated from small steps: each direction alone is refined a little, its change of the tip is scaled
-to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. The
-direction that loses most error for the time that it adds to a step is refined, until the sum is within `ACCURACY`. Where no
+to twice the number of elements by the power with which it falls (L. F. Richardson, 1911), and the changes are added up. Of the
+directions with a large part of the error, the one that loses most of it for the time that it adds to a step is refined, until the
+sum is within `ACCURACY`: one with a small part is cheap to refine, but each mesh on the way has to be measured. Where no
 direction can be refined any more, or the search has cost as much as it may, the mesh with the least error so far is taken, and a
-warning gives its estimate. The first direction is along the robot: under coarse layers the sections seem to be worse than they
-are, several times so where the stiffness jumps.
+warning gives its estimate where that is too large. What cannot be measured any more of the last mesh follows from coarser ones.
+The first direction is along the robot: under coarse layers the sections seem to be worse than they are, several times so where
+the stiffness jumps.
 
 The shapes of a mesh are followed up to the loads once. Those of the next mesh are found from there, see `carried_shape`.
 
@@ -37,11 +39,13 @@ from gravcomp.whole_file import write_whole
 ACCURACY = 1e-3
 """Error of the tip that a mesh may have, over the length."""
 
-_FORMAT = 9  # part of the key; to be raised when the choice changes
+_FORMAT = 10  # part of the key; to be raised when the choice changes
 # The part of `ACCURACY` that the estimate may use.
 _USED = 0.9
 # The power of the number of elements with which the change of a direction falls, in the order in which directions are measured.
 _ORDER = {"along": 1.0, "around": 1.5, "radial": 1.0}
+# The part of the error from which on a direction is refined.
+_MATTERS = 0.25
 # The sections are measured only where the change along the robot is within this part of `ACCURACY`.
 _ALONG_FIRST = 1.0
 _START_ALONG = 8
@@ -143,6 +147,8 @@ def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
     tips = _Tips(robot, here)
     choices: list[MeshChoice] = []
     left_out: dict[Elements, list[str]] = {}
+    known: dict[str, tuple[int, np.ndarray]] = {}  # of each direction, the last number of elements and change that is measured
+    exhausted = False
 
     def best_choice() -> tuple[MeshChoice, list[str]]:
         best = min(choices, key=lambda choice: choice.error)
@@ -151,7 +157,7 @@ def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
     while True:
         # Of the tips (l, 3) over the length, from this mesh to one twice as fine in a direction.
         changes: dict[str, np.ndarray] = {}
-        gains: dict[str, float] = {}
+        lost: dict[str, float] = {}  # error that the next mesh in a direction loses, of that to one twice as fine
         meshes: dict[str, Elements] = {}
         for direction in _ORDER:
             base, finer = here, tips.finer(here, direction)
@@ -160,25 +166,33 @@ def _choose(robot: Robot) -> tuple[MeshChoice, list[str]]:
             flat = direction == "radial" and "around" in changes and finer.radial > _FLAT * finer.around
             if flat and "around" in meshes and (deeper := tips.finer(meshes["around"], direction)) is not None:
                 base, finer = meshes["around"], deeper
+            number = getattr(base, direction)
             if choices and tips.work + tips.work_of(finer) > _MOST_WORK:
-                return best_choice()
-            twice = _to_twice(getattr(base, direction), getattr(finer, direction), direction)
-            changes[direction] = twice * tips.change(base, finer)
-            if base != here:  # more elements around are what allows more cells through the wall: they gain both changes
-                gains["around"] = _largest(changes["around"] + changes[direction]) / (tips.cost(base) - tips.cost(here))
+                exhausted = True
+                if direction not in known:
+                    return best_choice()
+                coarser, change = known[direction]
+                changes[direction] = (coarser / number) ** _ORDER[direction] * change
+                continue
+            changes[direction] = _to_twice(number, getattr(finer, direction), direction) * tips.change(base, finer)
+            known[direction] = number, changes[direction]
+            if base != here:  # more elements around are what allows more cells through the wall: they lose both changes
+                lost["around"] = _largest(changes["around"] + changes[direction])
             if flat or tips.unknowns(finer) > _MOST_UNKNOWNS:  # not to be used, but the error has to be known
                 continue
             meshes[direction] = finer
-            gains[direction] = _largest(changes[direction]) / (tips.cost(finer) - tips.cost(here))
+            lost[direction] = _largest(changes[direction])
             early = choices or tips.work < 0.5 * _MOST_WORK  # else there would be no estimate in the end
             if direction == "along" and early and _largest(changes[direction]) > _ALONG_FIRST * ACCURACY:
                 break
         else:  # all directions are measured
             choices.append(MeshChoice(here, _together(list(changes.values())) if changes else 0.0))
             left_out[here] = tips.left_out(list(changes.values()))
-            if choices[-1].error <= _USED * ACCURACY or not gains:
+            if choices[-1].error <= _USED * ACCURACY or exhausted or not lost:
                 return best_choice()
-        here = _not_deep(robot, meshes[max(gains, key=lambda direction: gains[direction])])
+        matters = [direction for direction in lost if lost[direction] >= _MATTERS * max(lost.values())]
+        added = {direction: tips.cost(meshes[direction]) - tips.cost(here) for direction in matters}
+        here = _not_deep(robot, meshes[max(matters, key=lambda direction: lost[direction] / added[direction])])
 
 
 def _to_twice(number: int, finer: int, direction: str) -> float:
