@@ -47,7 +47,6 @@ FIRST = (
     "test_colcon_workspace",
     "test_record_replay",
     "test_targets",
-    "test_check",
     "test_contact",
     "test_reduction",
     "test_calibrate_command",

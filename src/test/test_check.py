@@ -1,4 +1,4 @@
-"""The checks of `./gravcomp check`: lint, format and types of the whole source."""
+"""How `./gravcomp check` works, and what it does not find. `test/test_documented_lines.py` runs it over the whole source."""
 
 import fcntl
 import re
@@ -15,15 +15,6 @@ from gravcomp.commands.__main__ import main
 from gravcomp.commands.check import CHECKS, installed, run_check
 
 ROOT = Path(__file__).resolve().parents[2]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CHECKS)
-def test_the_source_passes(name):
-    if not installed(CHECKS[name].tool):
-        pytest.skip(f"{CHECKS[name].tool} is not installed")
-    passed, text = run_check(ROOT, name)
-    assert passed, text
 
 
 def test_types_are_checked_without_what_another_command_installs():

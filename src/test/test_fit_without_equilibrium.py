@@ -164,6 +164,14 @@ def test_a_motion_that_cannot_be_computed_is_a_refused_step(monkeypatch, fall):
         motion.fit_motion(BAR.with_material(youngs_modulus=1e6), [fall], creep=False)
 
 
+def test_a_fit_of_a_motion_ends_with_the_evaluations_that_it_may_take(monkeypatch, fall):
+    """As those of a brief run do; the values have moved towards the true ones."""
+    monkeypatch.setattr(motion, "predict_course", swing)
+    whole, brief = (motion.fit_motion(BAR, [fall], creep=False, evaluations=most) for most in (motion.EVALUATIONS, 2))
+    assert brief.evaluations < whole.evaluations
+    assert whole.rms_after < brief.rms_after < brief.rms_before
+
+
 def test_the_error_of_a_described_robot_whose_motion_cannot_be_computed_is_unknown(monkeypatch, fall):
     """The report says so in words, without a number."""
 

@@ -5,11 +5,11 @@ import functools
 import gc
 import logging
 import re
-from pathlib import Path
 from types import GenericAlias
 from typing import Any
 
 from sphinx import addnodes
+from sphinx.domains.python import PythonDomain
 from sphinx.pycode.parser import Parser
 from sphinx.search.en import SearchEnglish
 
@@ -35,10 +35,9 @@ include_patterns = [
     "src/doc/**",
     "src/gravcomp/canbus/*.md",
 ]
-templates_path = [str(Path(__file__).parent / "templates")]  # autosummary takes relative ones from the sources
 exclude_patterns = ["src/doc/api/**", "**/test/**", ".*"]
 
-autosummary_generate = True
+autosummary_generate = False  # gravcomp/commands/module_pages.py has written the pages
 # An object is described where it is defined, not again in the packages that export it.
 autodoc_default_options = {"members": True, "undoc-members": True, "ignore-module-all": True}
 autodoc_typehints = "signature"
@@ -112,6 +111,29 @@ def unlink_foreign_types(app: Any, doctree: Any) -> None:
             reference.replace_self(reference.children)
 
 
+class NamedObjects:
+    """Search for what a name in an annotation means only among the objects whose names end alike, in place of among all."""
+
+    def __init__(self) -> None:
+        self._search = PythonDomain.find_obj
+        self._by_end: dict[str, list[str]] = {}
+        self._count = -1
+
+    def find(self, domain: PythonDomain, env: Any, module: str, cls: str, name: str, *how: Any) -> list:
+        """Return what Sphinx finds: it compares whole names, or their ends."""
+        every = domain.data["objects"]
+        if len(every) != self._count:
+            self._by_end, self._count = {}, len(every)
+            for full in every:
+                self._by_end.setdefault(full.rpartition(".")[2], []).append(full)
+        ends_alike = self._by_end.get(name.removesuffix("()").rpartition(".")[2], ())
+        domain.data["objects"] = {full: every[full] for full in ends_alike}
+        try:
+            return self._search(domain, env, module, cls, name, *how)
+        finally:
+            domain.data["objects"] = every
+
+
 def setup(app: Any) -> None:
     """Register the hooks; the conversion comes before napoleon's."""
     logging.getLogger("sphinx").setLevel(logging.INFO)  # a hundred thousand messages of autodoc for its authors are not made
@@ -119,6 +141,8 @@ def setup(app: Any) -> None:
     Parser.parse_definition = lambda parser: None
     # The same few thousand words, eighty thousand times.
     SearchEnglish.stem = functools.cache(SearchEnglish.stem)
+    objects = NamedObjects()
+    PythonDomain.find_obj = lambda domain, *sought: objects.find(domain, *sought)
     app.connect("autodoc-skip-member", skip_aliases)
     app.connect("autodoc-process-docstring", plain_text, priority=400)
     app.connect("doctree-read", unlink_foreign_types)

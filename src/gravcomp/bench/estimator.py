@@ -21,6 +21,7 @@ from gravcomp.recordings.imu.broad_folder import WHERE, broad_trials
 from gravcomp.thermal import HeaterOptions
 from gravcomp.thermal.plant import ThermalPlantOptions
 from gravcomp.trials.yaw_drift import DURATION, REST, ablation, board_samples
+from gravcomp.virtual.imu_chip import SAMPLE_PERIOD
 from gravcomp.virtual.parameters import Board
 
 BIAS = math.radians(1.0) * np.array([1.0, -1.0, 1.0]) / math.sqrt(3.0)  # rad/s, added
@@ -28,6 +29,8 @@ WARM_UP = math.radians(0.3) * np.array([1.0, 1.0, -1.0]) / math.sqrt(3.0)  # rad
 WARM_UP_TIME = 60.0  # s
 HORIZON = 0.02  # s
 CHUNK, CHUNKS = 500, 20  # samples, number
+REST_TIME, HEATING_TIME = (40.0, 15.0), (300.0, 60.0)  # s: of the whole benchmark, of a brief one
+FROM_REST_TIME = 10.0  # s at rest that do not count: the filter settles
 
 
 def run(progress: Callable[[str], None], *, every: int = 1) -> dict:
@@ -39,10 +42,11 @@ def run(progress: Callable[[str], None], *, every: int = 1) -> dict:
     else:
         figures["broad"] = f"no recordings found. {WHERE}"
     progress("at rest on the virtual board")
-    figures["virtual_rest_jitter_deg"] = _virtual_jitter()
+    brief = every > 1
+    figures["virtual_rest_jitter_deg"] = _virtual_jitter(REST_TIME[brief])
     figures["us_per_sample"] = _cost(max(3, CHUNKS // every))
     progress("temperature control from 20 degC")
-    figures["thermal"] = _thermal()
+    figures["thermal"] = _thermal(HEATING_TIME[brief])
     figures["ablation"] = ablation(progress, duration=DURATION / every, rest=REST / every)
     return figures
 
@@ -129,13 +133,13 @@ def _jitter(gravity: np.ndarray) -> float:
     return float(np.degrees(np.sqrt(np.mean(_angle(gravity, np.broadcast_to(gravity.mean(axis=0), gravity.shape)) ** 2))))
 
 
-def _virtual_jitter() -> float:
+def _virtual_jitter(duration: float) -> float:
     estimator, gravity = GravityEstimator(), []
-    for sample in board_samples(Board(), None, 40.0, lambda t: 0.0, seed=1):
+    for sample in board_samples(Board(), None, duration, lambda t: 0.0, seed=1):
         estimate = estimator.update(sample.stamp_ns, sample.gyro, sample.accel)
         assert isinstance(estimate, GravityEstimate)  # the virtual board's samples are valid
         gravity.append(estimate.gravity)
-    return round(_jitter(np.array(gravity[1000:])), 4)
+    return round(_jitter(np.array(gravity[round(FROM_REST_TIME / SAMPLE_PERIOD) :])), 4)
 
 
 def _cost(chunks: int) -> float:
@@ -154,10 +158,10 @@ def _cost(chunks: int) -> float:
     return round(1e6 * float(np.median(costs)), 1)
 
 
-def _thermal() -> dict:
-    """Return the figures of heating the virtual board from 20 degC by 15 degC."""
+def _thermal(duration: float) -> dict:
+    """Return the figures of heating the virtual board from 20 degC by 15 degC; `settled_s`: None if not within `duration`."""
     options = HeaterOptions(margin=0.5)
-    samples = list(board_samples(Board(), options, 300.0, lambda t: 0.0, seed=1))
+    samples = list(board_samples(Board(), options, duration, lambda t: 0.0, seed=1))
     target = ThermalPlantOptions().ambient + options.rise
     temperature = np.array([s.true_temperature for s in samples])
     outside = np.flatnonzero(np.abs(temperature - target) > 0.5)

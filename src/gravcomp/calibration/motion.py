@@ -30,6 +30,8 @@ _CREEP_START = 0.08, 1.4
 # minimum with too much damping; such a short beginning contains no full swing.
 _BEGINNING = 1.08
 _DIFFERENCE = 0.02  # step of x for the derivatives
+EVALUATIONS = 12
+"""Most evaluations of each of the two fits: to the beginnings, and to the whole courses."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,11 @@ def fit_motion(
     progress: Callable[[str], None] = lambda sentence: None,
     modulus: bool = True,
     creep: bool = True,
+    evaluations: int = EVALUATIONS,
 ) -> MotionFit:
     """Fit to the courses. mapper: as `map`, may compute courses in parallel; modulus, creep: False keeps the robot's values.
+
+    evaluations: at most, of each of the two fits; with a few the values do not converge.
 
     A fitted modulus is that of all segments. Values with which a motion cannot be computed are a refused step of the fit; raises
     RuntimeError where it cannot be computed with those of the robot.
@@ -91,7 +96,7 @@ def fit_motion(
     steps = course_options(robot)  # the same for all values, so that they do not change the derivatives
     short = _Courses(beginnings, beginning.robot_at, steps, mapper, progress)
     whole = _Courses(courses, all_of_them.robot_at, steps, mapper, progress)
-    options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": 12}
+    options = {"x_scale": "jac", "xtol": 2e-3, "ftol": 1e-3, "max_nfev": evaluations}
     x = least_squares(short.residuals, short.first(beginning.start), jac=short.jacobian, bounds=beginning.bounds, **options).x
     # In the beginning, the stiffness of the creep branch adds to the lasting one.
     x = np.concatenate([x, all_of_them.start[len(x) :]])

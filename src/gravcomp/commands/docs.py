@@ -10,9 +10,13 @@ from pathlib import Path
 
 from gravcomp.commands import output
 from gravcomp.commands.folders import made_folder
+from gravcomp.commands.module_pages import write_module_pages
 
 CONFIGURATION = Path("src/doc/api")
 """Folder of Sphinx's conf.py and of the index page, relative to the repository."""
+
+PACKAGE = Path("src/gravcomp")
+"""The package whose modules have a page each, relative to the repository."""
 
 PAGE = Path("src/doc/bodies.md")
 """The page with a picture of each robot that it describes, relative to the repository."""
@@ -93,18 +97,20 @@ def _take_pictures(root: Path, folder: Path) -> int:
 def build(root: Path, out: Path) -> tuple[bool, str]:
     """Run Sphinx on the repository `root`, HTML into `out`. Returns whether there was no warning, and the warnings.
 
-    Sphinx reads a copy of the repository, because it writes the pages of the modules next to their index.
+    Sphinx reads a copy of the repository with the pages of the modules. It imports them from the repository, where they are
+    compiled to bytecode.
     """
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         source = Path(scratch) / "source"
         shutil.copytree(root, source, ignore=shutil.ignore_patterns(*_LEFT_OUT), symlinks=True)
         shutil.copy(source / CONFIGURATION / "index.md", source)
+        write_module_pages(root / PACKAGE, source / "modules")
         done = subprocess.run(
             [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", f"{scratch}/doctrees", "-c",
              str(source / CONFIGURATION), str(source), str(out)],
-            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(source / "src"), os.environ.get("PYTHONPATH", "")])},
+            env={**os.environ, "PYTHONPATH": os.pathsep.join([str(root / "src"), os.environ.get("PYTHONPATH", "")])},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
         )  # fmt: skip
-    return done.returncode == 0, done.stdout.replace(f"{source}/", "").strip()
+    return done.returncode == 0, done.stdout.replace(f"{source}/", "").replace(f"{root}/", "").strip()

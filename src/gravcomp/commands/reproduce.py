@@ -121,7 +121,9 @@ def run(args: argparse.Namespace) -> int:
             result.parameters.setdefault("seed", context.setup.seed)
             result.parameters.update({"robot": context.setup.source, "sweeps": sweep.place})
             if args.brief:
-                result.notes.insert(0, "Run with --brief: fewer and shorter runs than the article's experiment.")
+                result.notes.insert(
+                    0, "Run with --brief: fewer and shorter runs than the article's experiment, and fits that end early."
+                )
             pages.append(write_report(result, folder))
             results.append(result)
             output.note(f"{name}: {result.seconds:.0f} s")

@@ -6,7 +6,7 @@ import numpy as np
 
 from gravcomp.calibration.course import predict_course, predict_shapes
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import fit_motion
+from gravcomp.calibration.motion import EVALUATIONS, fit_motion
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.evaluation.metrics import angle_between
@@ -14,7 +14,7 @@ from gravcomp.mesh.robot_axis import rest_axis, rest_tip
 from gravcomp.report.drawing import MODEL, REAL, REST, Drawing, draw_robot, equal_axes, side_view
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
-from gravcomp.trials.free_fall import SAMPLE, falling_rod, free_fall, true_fall
+from gravcomp.trials.free_fall import BRIEF_EVALUATIONS, SAMPLE, falling_rod, free_fall, true_fall
 from gravcomp.trials.turning_base import INCLINATIONS
 from gravcomp.virtual.motion import base_orientation
 
@@ -45,6 +45,7 @@ def run(context: Context) -> Result:
         context.map(free_fall, jobs[len(inclinations) :], "free fall to fit the model to"),
         mapper=context.sweep.map,
         progress=lambda stage: context.progress(f"fitting the fall: {stage}"),
+        evaluations=BRIEF_EVALUATIONS if context.brief else EVALUATIONS,
     )
     robots = {"not calibrated": setup.robot, "calibrated": fit.robot}
     falls_of_models = [(robot, course) for robot in robots.values() for course in evaluated]

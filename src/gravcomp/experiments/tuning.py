@@ -9,13 +9,13 @@ import numpy as np
 
 from gravcomp.calibration.course import course_options, predict_course
 from gravcomp.calibration.measured import Measured
-from gravcomp.calibration.motion import fit_motion
+from gravcomp.calibration.motion import EVALUATIONS, fit_motion
 from gravcomp.calibration.parameters import with_moduli
 from gravcomp.description import Robot
 from gravcomp.report.drawing import MODEL, REAL, WITHOUT, Drawing
 from gravcomp.report.result import Figure, Plot, Result, Table
 from gravcomp.trials.context import Context
-from gravcomp.trials.free_fall import BRIEF_FALL, FALL, free_fall
+from gravcomp.trials.free_fall import BRIEF_EVALUATIONS, BRIEF_FALL, FALL, free_fall
 from gravcomp.trials.known_robot import Recovered, recover
 
 TITLE = "Tuning: grid against calibration"
@@ -42,7 +42,12 @@ def run(context: Context) -> Result:
     best = min(pairs, key=lambda pair: total(errors[pair]))
     # Only modulus and damping, as in the grid: two parameters against two.
     fit = fit_motion(
-        setup.robot, falls, mapper=context.sweep.map, progress=lambda s: context.progress(f"calibration: {s}"), creep=False
+        setup.robot,
+        falls,
+        mapper=context.sweep.map,
+        progress=lambda s: context.progress(f"calibration: {s}"),
+        creep=False,
+        evaluations=BRIEF_EVALUATIONS if context.brief else EVALUATIONS,
     )
     fitted = np.concatenate([np.linalg.norm(tip - f.tip_position, axis=1) for tip, f in zip(fit.predicted, falls)])
     recovered = recover(context)

@@ -17,6 +17,7 @@ from gravcomp.virtual.motion import base_orientation
 
 SAMPLE = 0.010  # s
 FALL, BRIEF_FALL = 5.4, 1.3  # first periods of the robot: falls to which a motion is fitted
+BRIEF_EVALUATIONS = 2  # of a brief fit to falls: a step is taken, but the values do not converge
 _STEP = 0.002  # s
 _RELEASED = -0.3  # of the length: paid out so far that the cables stay slack
 

@@ -7,12 +7,12 @@ import numpy as np
 
 from gravcomp.calibration.fit import StaticFit, fit_statics
 from gravcomp.calibration.measured import StillWindows
-from gravcomp.calibration.motion import fit_motion
+from gravcomp.calibration.motion import EVALUATIONS, fit_motion
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.description import Robot
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.trials.context import Context
-from gravcomp.trials.free_fall import BRIEF_FALL, FALL, free_fall
+from gravcomp.trials.free_fall import BRIEF_EVALUATIONS, BRIEF_FALL, FALL, free_fall
 from gravcomp.trials.tracker import Tracker
 from gravcomp.virtual.body import build_rod
 from gravcomp.virtual.equilibrium import equilibrium
@@ -77,6 +77,7 @@ def recover(context: Context) -> list[Recovered]:
         mapper=context.sweep.map,
         progress=lambda s: context.progress(f"fall of the known robot: {s}"),
         creep=False,
+        evaluations=BRIEF_EVALUATIONS if context.brief else EVALUATIONS,
     )
     found.append(
         Recovered(
