@@ -105,6 +105,43 @@ def test_what_the_data_do_not_show_keeps_its_value_with_a_reason(robot):
     assert any("cannot be told from these data" in warning and "compliance" in warning for warning in fit.warnings)
 
 
+class Rubbing(Springs):
+    """Tips that friction inside the material holds back, and that creep, by fixed random numbers too."""
+
+    def __init__(self, springs: Springs, robot):
+        super().__init__(robot, springs.windows)
+        random, scale = np.random.default_rng(8), np.repeat([robot.length, 1.0], 3)[:, None]
+        self._by_time = 0.5 * scale * random.standard_normal((len(self.windows.gravity), 6, 3))
+
+    def predict(self, parameters: StaticParameters) -> StaticPrediction:
+        own = super().predict(parameters)
+        return StaticPrediction(own.tip + self._by_time @ [*parameters.creep, parameters.slip], own.tension)
+
+    def differentiate(self, parameters: StaticParameters, kinds: set[str]) -> dict[str, np.ndarray]:
+        return super().differentiate(parameters, kinds) | {"creep": self._by_time[:, :, :2], "slip": self._by_time[:, :, 2:]}
+
+
+def test_friction_inside_the_material_is_fitted_but_not_told(robot):
+    """On whole virtual robots a third of the truth is found and less, with a scatter that says nothing of it."""
+    rubbing = Rubbing(measured_springs(robot, 0, 0.0), robot)
+    described = np.array([material.youngs_modulus for material in robot.materials])
+    compliance = np.array([robot.cable_compliance(cable) for cable in robot.cables])
+    found, usual = 0.007, 0.04
+    true = StaticParameters(
+        TRUE_RATIO * described, np.zeros(len(compliance)), compliance, creep=np.array([0.03, 0.04]), slip=found
+    )
+    tip = rubbing.predict(true).tip
+    rubbing.windows = dataclasses.replace(rubbing.windows, tip_position=tip[:, :3], tip_direction=tip[:, 3:])
+    fit = fit_statics(robot, rubbing.windows, groups={"creep"}, creep_times=(2.0, 20.0), predictor=rubbing)
+    (slip,) = (estimate for estimate in fit.estimates if estimate.kind == "slip")
+    assert slip.value == pytest.approx(found, abs=0.1 * usual) and not slip.reason
+    assert fit.parameters.youngs_modulus == pytest.approx(TRUE_RATIO * described, rel=2e-3)  # it does not stand for friction
+    assert not slip.seen and slip.value + slip.interval > usual
+    assert any("friction inside the material: fitted" in warning and "not told" in warning for warning in fit.warnings)
+    assert all(estimate.seen for estimate in fit.estimates if estimate.kind == "creep")
+    assert "hardly seen" in origin_of("robot", "data", fit)["values_at_95_percent"][slip.name]
+
+
 class OneModulus(Springs):
     """Of the first `count` windows, whose tips move with the moduli of some segments only."""
 

@@ -16,6 +16,9 @@ TOLD = 0.5  # a stretch whose half interval is a larger share of it says little:
 _WEAK = 1.0 / SEEN**2 - 1.0  # information in x, below which the prior outweighs the data
 _PARTNER = 0.3  # of the largest entry of a weak combination: what belongs to it
 
+UNTOLD = {"slip": "a tip that swings before it rests loses what friction held, and does not show which sections slip"}
+"""Kinds that are fitted so that nothing else stands for them, and why what is found tells nothing of the robot."""
+
 _UNITS = {
     "modulus": ("MPa", 1e-6), "offset": ("mm", 1e3), "compliance": ("mm/N", 1e3), "radius": ("%", 100.0),
     "angle": ("deg", 180.0 / math.pi), "mount": ("deg", 180.0 / math.pi), "bias": ("m/s^2", 1.0),
@@ -146,7 +149,8 @@ def estimate(
     name = name_of(robot, unknown, times)
     if unknown.kind == "modulus":
         return Estimate(name, unit, before, value, value * half, bool(sigma < SEEN_MODULUS), reason, "modulus", first)
-    return Estimate(name, unit, before, value, factor * unknown.scale * half, not reason, reason, unknown.kind, first)
+    seen = not reason and unknown.kind not in UNTOLD
+    return Estimate(name, unit, before, value, factor * unknown.scale * half, seen, reason, unknown.kind, first)
 
 
 def warnings(robot: Robot, unknowns: list[Unknown], estimates: tuple[Estimate, ...], driven: bool) -> list[str]:
@@ -167,5 +171,10 @@ def warnings(robot: Robot, unknowns: list[Unknown], estimates: tuple[Estimate, .
         f"{e.name}: these data hardly determine it (± {e.interval:.2g} {e.unit}); it follows the other segments"
         for e in estimates
         if not e.seen and e.kind == "modulus" and not e.reason
+    ]
+    found += [
+        f"{e.name}: fitted, so that moduli and creep do not stand for it, but not told (± {e.interval:.2g}): {UNTOLD[e.kind]}"
+        for e in estimates
+        if e.kind in UNTOLD and not e.reason
     ]
     return found

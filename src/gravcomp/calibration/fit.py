@@ -13,6 +13,7 @@ it.
 Intervals are at 95 %: cov = (J^T J + R^T R)^-1, with J scaled by those sigmas and with every unknown, those that are not fitted
 as well: what is not known of them widens the intervals of the others. Those of moduli contain in addition what the model lacks
 (`TipNoise.stiffness`), and those of creep, with all that is correlated with it, what no branch follows (`TipNoise.creep`).
+Friction inside the material is fitted, because moduli and creep would stand for it, but not told (`estimates.UNTOLD`).
 Gravity bends the robot by density over modulus, so tips alone cannot tell both: without a balance the density keeps its value,
 and its uncertainty is part of the moduli's intervals.
 """
@@ -36,6 +37,7 @@ from gravcomp.confidence import half_width
 from gravcomp.config import parameter
 from gravcomp.description import Robot
 from gravcomp.full_model.robot_model import RobotModel
+from gravcomp.materials.material_classes import class_of
 from gravcomp.mesh.coarse import with_coarse_elements
 
 _AT_BOUND = 0.01  # of a logarithm
@@ -56,10 +58,16 @@ class TipNoise:
         description="error of the stiffness that no fit sees, relative: inner friction, the law at small strain",
     )
     creep: float = parameter(
-        0.45,
+        0.35,
         minimum=0.0,
         maximum=2.0,
         description="error of a branch of creep that no fit sees, relative: bodies creep by other times than the branches",
+    )
+    slip: float = parameter(
+        0.8,
+        minimum=0.0,
+        maximum=10.0,
+        description="error of the friction inside the material that no fit sees, over that of its class",
     )
     balance: float = parameter(5e-3, minimum=1e-6, maximum=0.5, description="deviation of a weighed mass, relative")
 
@@ -156,7 +164,7 @@ def fit_statics(
     problem.sigma = problem.residual_sigma(x, noise.smallest * sigma)
     covariance = problem.covariance(x)
     after, parameters = problem.predict(x), parameters_at(x, unknowns, initial)
-    deviation = np.hypot(np.sqrt(np.diag(covariance)), _unseen(covariance, unknowns, parameters, initial, noise))
+    deviation = np.hypot(np.sqrt(np.diag(covariance)), _unseen(robot, covariance, unknowns, parameters, initial, noise))
     estimates = tuple(
         estimate(robot, unknown, initial, parameters, quantile * half, half, reason, creep_times)
         for unknown, half, reason in zip(unknowns, deviation, reasons)
@@ -204,7 +212,12 @@ def _no_start(error: RuntimeError) -> MeasurementError:
 
 
 def _unseen(
-    covariance: np.ndarray, unknowns: list[Unknown], parameters: StaticParameters, initial: StaticParameters, noise: TipNoise
+    robot: Robot,
+    covariance: np.ndarray,
+    unknowns: list[Unknown],
+    parameters: StaticParameters,
+    initial: StaticParameters,
+    noise: TipNoise,
 ) -> np.ndarray:
     """Return the deviations (u,) in x that the scatter of the tips does not show.
 
@@ -212,6 +225,8 @@ def _unseen(
     """
     found = np.array([noise.stiffness if unknown.kind == "modulus" else 0.0 for unknown in unknowns])
     for i, unknown in enumerate(unknowns):
+        if unknown.kind == "slip":
+            found[i] = noise.slip * class_of(robot.materials[0].youngs_modulus).slip / unknown.scale
         if unknown.kind == "creep":
             of_branch = noise.creep * max(float(values.creep[unknown.index[0]]) for values in (parameters, initial))
             found = np.hypot(found, of_branch / unknown.scale * covariance[:, i] / covariance[i, i])
