@@ -2,8 +2,9 @@
 
 Of all bases with r columns, the POD basis has the smallest projection error of the snapshots u_s (Sirovich 1987), here in the
 norm |u|^2 = u^T K_0 u with the stiffness K_0 of the straight robot. A Galerkin solution is optimal in the energy, so this norm
-keeps the stiff, small motions (stretch, warping) without which a bending body locks. With the Gram matrix G = U K_0 U^T = V S
-V^T,
+keeps the stiff, small motions (stretch, warping) without which a bending body locks. Each snapshot counts with the norm 1: of a
+robot so soft that it falls over when it is released, the fallen shapes have a hundred times the energy of those that are held, and
+would take all modes. With the Gram matrix G = U K_0 U^T = V S V^T of such snapshots,
 
     Phi = U^T V_r S_r^(-1/2),      Phi^T K_0 Phi = I,      q = Phi^T K_0 u.
 """
@@ -14,6 +15,8 @@ import numpy as np
 
 # An eigenvalue below this fraction of the largest is rounding error.
 _ROUNDING = 1e-12
+# Of the median norm: a smaller snapshot counts less, as what is left of it by the solver's tolerance would count with it.
+_SMALL = 1e-2
 
 
 def energy_basis(snapshots: np.ndarray, stiffness: Callable[[np.ndarray], np.ndarray], modes: int) -> np.ndarray:
@@ -21,8 +24,10 @@ def energy_basis(snapshots: np.ndarray, stiffness: Callable[[np.ndarray], np.nda
 
     stiffness: multiplies (n, k) by K_0. r is `modes`, or fewer if the snapshots have a lower rank.
     """
-    combination = principal_combinations(snapshots @ stiffness(snapshots.T), modes)
-    basis = snapshots.T @ combination
+    gram = snapshots @ stiffness(snapshots.T)
+    norm = np.sqrt(np.diag(gram))
+    size = 1.0 / np.maximum(norm, max(_SMALL * float(np.median(norm)), np.finfo(float).tiny))
+    basis = snapshots.T @ (size[:, None] * principal_combinations(size[:, None] * gram * size, modes))
     # A second orthonormalisation removes the rounding error of the small modes.
     correction = np.linalg.cholesky(basis.T @ stiffness(basis))
     return np.linalg.solve(correction, basis.T).T
