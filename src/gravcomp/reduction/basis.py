@@ -17,7 +17,7 @@ import numpy as np
 
 # An eigenvalue below this fraction of the largest is rounding error.
 _ROUNDING = 1e-12
-# Of the median norm: a smaller snapshot counts less, as what is left of it by the solver's tolerance would count with it.
+# Of the median norm: a smaller snapshot counts less, as the solver's tolerance would count with it.
 _SMALL = 1e-2
 
 
