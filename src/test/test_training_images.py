@@ -93,7 +93,8 @@ def test_fewer_paths_are_followed_where_each_stands_for_its_images():
 
 
 def test_gravity_turns_by_less_where_a_soft_robot_moves_far(monkeypatch):
-    model, options = RobotModel(tube(modulus=1.5e4)), TrainingOptions(paths=2, steps=12)
+    model, options = RobotModel(tube(modulus=1.5e4)), TrainingOptions(paths=4, steps=12)
+    monkeypatch.setattr(module, "_RELEASED", 1.0)  # with cables, gravity also waits where the tip is far from its target
     lost = {}
     for farthest in (module._FARTHEST, 1e9):
         monkeypatch.setattr(module, "_FARTHEST", farthest)

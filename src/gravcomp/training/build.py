@@ -110,16 +110,25 @@ def trained(
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
 
-    def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
-        """Return whether the modes (n, r) represent the share `most` of the samples."""
+    def missed(basis: np.ndarray, some: list[Sample]) -> np.ndarray:
+        """Return what the modes (n, r) miss of each sample (s,): at the section where it is most, over the length."""
         shapes = _shapes(some).T
         missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
-        apart = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
-        return bool(np.quantile(apart, most) <= options.represented)
+        apart: np.ndarray = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
+        return apart
+
+    def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
+        """Return whether the modes (n, r) represent the share `most` of the samples."""
+        return bool(np.quantile(missed(basis, some), most) <= options.represented)
 
     def basis_of(some: list[Sample]) -> np.ndarray:
-        """Return as many modes (n, r) of the samples as the robot may have, the most important ones first."""
-        return energy_basis(evenly(_shapes(some), options.decomposed), matrix.multiply, most_modes)
+        """Return as many modes (n, r) of the samples as the robot may have, the most important ones first.
+
+        Of modes for the energy and modes to which each sample counts alike: those that miss less of the samples (mean square).
+        """
+        shapes = evenly(_shapes(some), options.decomposed)
+        both = [energy_basis(shapes, matrix.multiply, most_modes, alike=alike) for alike in (False, True)]
+        return min(both, key=lambda basis: float(np.mean(missed(basis, some) ** 2)))
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
         """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
@@ -139,7 +148,7 @@ def trained(
         )
     progress("decomposing", 0.0)
     shapes = evenly(_shapes(found), options.decomposed)
-    basis = energy_basis(shapes, matrix.multiply, most_modes)
+    basis = basis_of(found)
     if represent(basis[:, :modes], found, _MOST_TRAINED):
         basis = np.ascontiguousarray(basis[:, :modes])
     progress("integrating", 0.0)

@@ -7,9 +7,10 @@ tensions are those of the closed loop, including its transients. On the other pa
 external loads has one on most paths: a force and a moment in a random direction on a random section, mostly the tip's, that grow
 and fall along the path up to its `max_wrench`.
 
-A soft robot loses its equilibrium on some paths. The controller takes such a command back, as in the running loop, and gravity
-turns by half as much from where there was one; a path on which that does not help is at its end, as a search from the straight
-robot takes longer than all steps of a path. Where the robot moves far, gravity turns by less in the first place, because a step
+A soft robot loses its equilibrium on some paths. The turn of gravity and the way of the cables are then halved, from where there
+was one; a path on which that does not help is at its end, as a search from the straight robot takes longer than all steps of a
+path. Gravity waits while the cables do not yet keep the tip near its target: what the loop reaches in hundreds of small steps has
+to be in a path of a few large ones. Where the robot moves far, gravity turns by less in the first place, because a step
 that is lost takes as long as four that are not. For the same reason a path whose first shape one search does not find begins with
 the hanging robot, and gravity turns from there to the direction that is wanted first. So the path is the search, and a robot that
 would sink when it stands upright is held on the way.
@@ -40,12 +41,15 @@ _INTERVAL = 0.1
 _STRAIGHT_ON = np.radians(70.0)
 # How exact the shapes are, over the length: far below what the modes leave.
 _TOLERANCE = 1e-5
-# Steps in a row without equilibrium that end a path: the controller has taken the command back twice and paid out once.
+# Steps in a row without equilibrium that end a path, each half as long as the one before.
 _LOST_STEPS = 3
 # After a step with an equilibrium the next one is longer by this factor; after one without, half as long.
 _GROWING = 1.4
 # How far a node should move in a step, over the length: Newton's method loses longer ones, after three times as many factors.
 _FARTHEST = 0.07
+# Steps in which gravity waits for the cables, where these leave the tip farther than that from its target: a soft robot falls
+# faster than winches wind in, and would be trained lying down only.
+_MOST_WAITS = 3
 # Largest turn of gravity in a step from the direction in which the robot hangs to the one that is wanted first. These steps do
 # not count: released robots would hardly leave the directions in which they hang.
 _TURN_AT_START = np.radians(30.0)
@@ -169,7 +173,7 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     gravity = _start(simulator.solver, wanted)
     if gravity is None:
         return
-    reached, part, turned = gravity, 1.0, 0.0
+    reached, part, turned, waited = gravity, 1.0, 0.0, 0
     axis, left, turn = *_way(gravity, wanted), _TURN_AT_START
     steps = options.steps + int(np.ceil(left / turn))
     simulator.solver.extrapolates = True  # gravity turns evenly
@@ -177,7 +181,8 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
     for step in range(steps):
         load = largest * np.append(np.full(6, np.sin(np.pi * (step + 1) / steps)), 1.0)
         shape = simulator.step(gravity, displacement, wrench=wrench_of(load))
-        if shape.is_equilibrium:
+        found = shape.is_equilibrium
+        if found:
             unknowns = model.free(simulator.displacements).copy()
             if step:
                 moved = float(np.abs(unknowns - before).max()) / model.length
@@ -192,17 +197,20 @@ def _path(model: RobotModel, options: TrainingOptions, rng: np.random.Generator)
                 return
         if left <= 0.0:
             axis, left, turn = _direction(rng), _STRAIGHT_ON, _TURN
-        turned = min(part * turn, left)
+        far = False
+        if found and target is not None:
+            command = controller.step(
+                shape.response, target, backbone_station=shape.backbone_station, tension=shape.cable_tension, interval=_INTERVAL
+            )
+            displacement, far = command.displacement, command.lateral > _FARTHEST * model.length
+        waited = waited + 1 if far and waited < _MOST_WAITS else 0
+        turned = 0.0 if waited else min(part * turn, left)
         gravity = _rotated(reached, axis, turned)
-        if target is not None:
-            displacement = controller.step(
-                shape.response,
-                target,
-                backbone_station=shape.backbone_station,
-                tension=shape.cable_tension,
-                interval=_INTERVAL,
-                followed=not lost,
-            ).displacement
+        if not found and displacement is not None:
+            # Half as far for the cables, too. The controller would take its command back and then go on in small steps, as in
+            # the loop, which has hundreds of them; a path has fifteen.
+            displacement = shape.cable_displacement + 0.5 * (displacement - shape.cable_displacement)
+            controller.reset(displacement)
 
 
 def _start(solver: StaticSolver, gravity: np.ndarray) -> np.ndarray | None:
