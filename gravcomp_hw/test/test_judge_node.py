@@ -88,7 +88,5 @@ def test_a_controller_that_refuses_at_first_is_asked_again():
 def test_a_run_without_compensation_has_no_figures():
     with Graph("relax_time:=0.5") as graph:
         graph.answers["enable"] = False
-        with pytest.raises(
-            ConfigError, match=r"compensation has not begun: .*_controller/enable: the answer is 'not now'"
-        ):
+        with pytest.raises(ConfigError, match=r"compensation has not begun: .*_controller/enable: the answer is 'not now'"):
             graph.run(lambda: graph.judge._phase == "done")

@@ -10,9 +10,11 @@ from scipy.spatial.transform import Rotation
 from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.bench.sampled_depth import sampled_depth
 from gravcomp.contact.outline_gap import deepest
+from gravcomp.contact.places import find_places
 from gravcomp.contact.start import refuse_start
 from gravcomp.contact.surface import contact_surface
 from gravcomp.description import Elements, load_robot_file
+from gravcomp.full_model.contact import FullContact
 from gravcomp.simulation import RobotModel, Simulator
 
 HALF = 7.0  # mm, of a cube
@@ -110,6 +112,23 @@ def test_a_robot_on_an_edge_enters_nothing_and_gains_no_energy(model, tmp_path, 
     gained = model.elements.energy(moved) - first - net
     assert gained < 1e-3 * work
     assert where != "across the robot" or gained > -1e-3 * work
+
+
+def test_a_place_on_a_flat_face_has_no_curvature_where_the_middle_is_between_two_faces(model, tmp_path):
+    """Every other face of a hexagonal lumen is of one row. From the middle of a section two of them are equally near."""
+    radius = 0.5e3 * model.robot.segments[0].outer_diameter
+    lumen = trimesh.creation.cylinder((radius + 0.05) / np.cos(np.pi / 6), 1e3 * model.length, sections=6)
+    lumen.apply_translation([0.0, 0.0, 0.5e3 * model.length])
+    lumen.export(tmp_path / "lumen.stl")
+    contact = FullContact(model, scene_of(meshes=[{"file": str(tmp_path / "lumen.stl"), "side": "inside"}]))
+    sections = contact.sections(np.zeros_like(model.mesh.nodes))
+    toward = np.deg2rad(90.0) + 1e-4  # a face; those on both sides of it are of one row
+    sections[:, 0] += 0.02e-3 * np.array([np.cos(toward), np.sin(toward), 0.0])
+    last = np.zeros((len(contact.arrays.kind), contact.surface.slots, 3))
+    places = find_places(contact.arrays, contact.surface, sections, np.zeros_like(sections[:, 0]), contact.margin, last)
+    inner = (places.station > 5) & (places.station < len(sections) - 5)
+    assert inner.any()
+    np.testing.assert_allclose(places.curvature[inner], 0.0, atol=1e-3)
 
 
 @pytest.mark.parametrize("turn", [0.0, 6.0, 15.0], ids=["in an edge", "next to it", "on a face"])

@@ -145,6 +145,23 @@ def test_faces_that_meet_in_a_hollow_edge_are_rows_of_their_own(tmp_path):
     assert lumen.nearest(points)[0] == pytest.approx(-outside.nearest(points)[0])
 
 
+def test_faces_that_meet_in_a_hollow_corner_are_rows_of_their_own(tmp_path):
+    """Faces on opposite sides of a corner of an octahedron have no edge in common; a section in the corner touches them all."""
+    import trimesh
+
+    corners = 0.02 * np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
+    body = trimesh.convex.convex_hull(trimesh.PointCloud(corners))
+    outside = scene(tmp_path, meshes=[{"file": written(tmp_path, body), "file_unit_mm": 1000}])
+    hollow = scene(tmp_path, meshes=[{"file": written(tmp_path, body), "file_unit_mm": 1000, "side": "inside"}])
+    assert len(outside.arrays.kind) == 1, "no corner of an octahedron is hollow from outside"
+    for corner in corners:
+        point, normal = corner * (1.0 - 1e-3 * np.sqrt(3.0) / 0.02), np.empty((len(hollow.arrays.kind), 3))
+        gap = np.array([gap_to(hollow.arrays, k, point, normal[k]) for k in range(len(normal))])
+        near = np.flatnonzero(gap < 1.001e-3)
+        assert len(near) == 4 and gap[near] == pytest.approx(4 * [1e-3])
+        assert len(np.unique(np.sign(normal[near]), axis=0)) == 4
+
+
 def test_obstacles_in_the_world_keep_their_place_when_the_robot_turns():
     table = scene(planes=[{"normal": [0, 0, 1], "point_mm": [0, 0, -50], "frame": "world"}])
     point = np.array([[-0.03, 0.0, 0.1]])

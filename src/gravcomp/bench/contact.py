@@ -10,7 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, random_scene, scene_of, seeded_gravity
+from gravcomp.bench.contact_lumens import is_lumen, moved_scene
+from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, scene_of, seeded_gravity
 from gravcomp.bench.sampled_depth import sampled_depth
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.shape import Shape
@@ -121,20 +122,26 @@ def motion(progress: Progress, every: int = 1) -> dict:
     `penetration_mm`: deepest place of the surface in a rigid wall; `contact_energy`: work that contact gives to the robot over
     the closed path, as a share of the work of the weight on it, taken without sign; `contact_scenes`: scenes that touched;
     `lost_steps`: share of the steps without an equilibrium; `unsolved_scenes`: scenes that `solve` does not enter from the
-    straight robot, left out.
+    straight robot, left out; `lumen_penetration_mm`, `lumen_lost_steps` and `unsolved_lumens`: the same of the lumens from
+    meshes, which are a tenth of the scenes.
     """
     model = RobotModel(moved_robot())
-    found = []
+    found = {}
     for seed in range(0, _SCENES, every):
         progress(f"scene {seed + 1} of {_SCENES}")
-        found.append(scene_motion(model, seed))
-    moved = [scene for scene in found if scene is not None]
+        found[seed] = scene_motion(model, seed)
+    moved = [scene for scene in found.values() if scene is not None]
+    lumens = [scene for seed, scene in found.items() if is_lumen(seed)]
+    in_lumens = [scene for scene in lumens if scene is not None]
     return {
         "penetration_mm": 1e3 * max((scene.deepest for scene in moved), default=0.0),
         "contact_energy": max((scene.gained for scene in moved), default=0.0),
         "contact_scenes": sum(scene.touches for scene in moved),
         "lost_steps": sum(scene.lost for scene in moved) / max(sum(scene.steps for scene in moved), 1),
         "unsolved_scenes": len(found) - len(moved),
+        "lumen_penetration_mm": 1e3 * max((scene.deepest for scene in in_lumens), default=0.0),
+        "lumen_lost_steps": sum(scene.lost for scene in in_lumens) / max(sum(scene.steps for scene in in_lumens), 1),
+        "unsolved_lumens": len(lumens) - len(in_lumens),
     }
 
 
@@ -151,7 +158,7 @@ class SceneMotion:
 
 def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
     """Turn gravity in the scene of a seed, there and back. None where `solve` does not enter it from the straight robot."""
-    simulator, start = Simulator(model, reduced=False, scene=random_scene(seed, model.robot)), seeded_gravity(seed)
+    simulator, start = Simulator(model, reduced=False, scene=moved_scene(seed, model.robot)), seeded_gravity(seed)
     axis = np.random.default_rng(seed).standard_normal(3)
     axis /= np.linalg.norm(axis)
     angles = _TURN * np.concatenate([np.arange(_STEPS // 2), np.arange(_STEPS // 2 - 2, -1, -1)])

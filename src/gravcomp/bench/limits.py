@@ -111,6 +111,9 @@ ROWS = {
         Row("self_contact_tip_pct", "tip of the coiled robot against the virtual robot's rod, share of the length, worst", "%"),
         Row("free_tip_pct", "the same before it touches itself", "%"),
         Row("unsolved_scenes", "scenes of 200 that are not entered from the straight robot", ""),
+        Row("lumen_penetration_mm", "deepest place in a lumen from a mesh, 20 of these scenes", "mm", 0.02),
+        Row("lumen_lost_steps", "steps without an equilibrium in lumens from meshes, share", ""),
+        Row("unsolved_lumens", "lumens from meshes that are not entered from the straight robot, of 20", ""),
     ),
     "robots": (
         Row("robots.*.mesh_error_pct", "tip against a mesh twice as fine, share of the length", "%", 0.1),

@@ -109,7 +109,7 @@ def _deepest_at_edges(
     The direction a in the section is sought at which the normal of the ball there points back to its middle. At an edge along the
     robot, going where the normal points leads past it: then a lies between the last two, and is found by the Illinois method.
     """
-    share, point, from_middle = _ball(scene.kind[row], surface, station), np.empty(3), normal.copy()
+    share, point, from_middle = ball(scene.kind[row], surface, station), np.empty(3), normal.copy()
     x, y = _against(normal, section)
     length = np.sqrt(x * x + y * y)
     first_x, first_y = (x / length, y / length) if length > 1e-9 else (1.0, 0.0)
@@ -151,8 +151,8 @@ def _deepest_at_edges(
 
 
 @njit(cache=True)
-def _ball(kind: int, surface: ContactSurface, station: int) -> float:
-    """Return the radius of the ball at a station, as a share of the way from the outline to the middle of the section."""
+def ball(kind: int, surface: ContactSurface, station: int) -> float:
+    """Return the radius of the ball next to an obstacle with edges, as a share of the way from the outline to the middle."""
     if surface.outline.shape[1]:
         return _BLUNT
     largest, place = _LARGEST if kind == SURFACE else 1.0, surface.place[station]

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from gravcomp.contact.outline_gap import deepest, deepest_from
+from gravcomp.contact.outline_gap import ball, deepest, deepest_from
 from gravcomp.contact.surface import ContactSurface, size_and_way
-from gravcomp.scene.distance import PLANE, SceneArrays, gap_to
+from gravcomp.scene.distance import BOX, PLANE, SURFACE, SceneArrays, gap_to
 
 _MOVES, _THERE = 8, 1e-7  # corrections of the place along the robot, and the part of a distance of stations that ends them
 _ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
@@ -147,7 +147,7 @@ def find_places(
             if on_rim[k, n]:
                 result.row[i], result.station[i], result.slot[i] = k, stations - 1, stations + n
                 result.first[i], result.share[i, 3] = stations - 4, 1.0
-                _write_frame(scene, surface, tip, surface.rim[n], edge[k, n], there[k, n], result, i)
+                _write_frame(scene, surface, tip, surface.rim[n], edge[k, n], there[k, n], 1.0, result, i)
                 i += 1
     return result
 
@@ -204,29 +204,40 @@ def _write_place(
             result.rocking[i] = -1.0 / bend
     result.first[i] = between(place, stations, share, tilt)
     _section_at(sections, result.first[i], share, section)
-    _write_frame(scene, surface, section, here, best, there, result, i)
+    sharp = scene.kind[k] == BOX or scene.kind[k] == SURFACE
+    _write_frame(scene, surface, section, here, best, there, ball(scene.kind[k], surface, s) if sharp else 1.0, result, i)
 
 
 @njit(cache=True)
 def _write_frame(
     scene: SceneArrays, surface: ContactSurface, section: np.ndarray, own: np.ndarray, gap: float, normal: np.ndarray,
-    result: Places, i: int,
+    share: float, result: Places, i: int,
 ) -> None:  # fmt: skip
-    """Write gap, normal, tangents and curvature of place i, which is at own (2,) in a section (3, 3)."""
+    """Write gap, normal, tangents and curvature of place i, which is at own (2,) in a section (3, 3).
+
+    share: of the way from the outline to the middle of the section, at which the ball of `outline_gap` has its centre. The normal
+    is the one there; at the middle, which is farther off, another part of the obstacle may be nearest.
+    """
     result.own[i], result.gap[i], result.normal[i] = own, gap, normal
     write_tangents(section, result, i)
     if scene.kind[result.row[i]] == PLANE:
         result.curvature[i] = 0.0
         return
     h, bend, point, turned = 0.02 * surface.radius[result.station[i]], 0.0, np.empty(3), np.empty(3)
+    inside = 0.0  # distance of the ball's centre from the middle, along the normal
     for side in (1.0, -1.0):
         for j in range(3):
-            point[j] = section[0, j] + side * h * result.around[i, j]
+            off = (1.0 - share) * (own[0] * section[1, j] + own[1] * section[2, j])
+            inside -= 0.5 * off * normal[j]
+            point[j] = section[0, j] + off + side * h * result.around[i, j]
         gap_to(scene, result.row[i], point, turned)
         for j in range(3):
             bend += side * turned[j] * result.around[i, j]
-    bend /= 2.0 * h
-    result.curvature[i] = min(max(bend, -1.0 / h), 1.0 / h)
+    bend = min(max(bend / (2.0 * h), -1.0 / h), 1.0 / h)
+    if share < 1.0:  # faces are flat, and edges stand out: nothing bends around the robot
+        bend = max(bend, 0.0)
+        bend /= 1.0 + bend * max(inside, 0.0)
+    result.curvature[i] = bend
 
 
 @njit(cache=True)

@@ -19,6 +19,7 @@ from gravcomp.scene.surface_distance import SurfaceArrays, surface_gap
 PLANE, SPHERE, BOX, TUBE, SURFACE = range(5)
 
 _NEWTON_STEPS = 30
+_SAME = 1e-9  # of a distance: the nearest edge or corner is that of faces of several groups, but for rounding
 _EXACT = 1e-7  # of a piece of a curve: after a step of Newton's method that is shorter, the next one would be rounding error
 
 
@@ -104,7 +105,7 @@ def _surface(scene: SceneArrays, k: int, point: np.ndarray, normal: np.ndarray) 
     gap, side = scene.sign[k] * surface_gap(scene.surface, scene.first[k], point, normal), scene.sign[k]
     if gap < 0.0 and scene.last[k] >= 0:
         whole = scene.sign[k] * surface_gap(scene.surface, scene.last[k], point, np.empty(3))
-        if gap < whole:
+        if gap < whole - _SAME * abs(whole):
             gap, side = -gap, -side
     for i in range(3):
         normal[i] *= side
