@@ -13,6 +13,7 @@ from gravcomp.full_model.shape import Response
 from gravcomp.graph.parameters.virtual_tracker import VirtualTrackerParameters
 from gravcomp.inverse import straight_target
 from gravcomp.tip_observer import TipObserver, TipObserverOptions, TrackerState
+from gravcomp.tip_observer.load_change import LoadChange
 from gravcomp.trials.tracked import with_wrong_model
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 from gravcomp.virtual.tracker import VirtualTracker
@@ -89,6 +90,30 @@ def test_constant_error_is_found_within_seconds() -> None:
     corrected = made.observer.corrected(straight_target(ROBOT.length), made.time)
     np.testing.assert_allclose(corrected.tip_position, REST - made.status.offset)
     assert made.status.state == TrackerState.USED
+
+
+def test_cables_that_move_to_and_fro_with_the_corrections_leave_the_estimate_as_certain_as_it_is() -> None:
+    """Else a correction by a noisy measurement would make the next one larger: the tip was never at rest."""
+
+    def scatter(to_and_fro: float) -> float:
+        made, offsets = model(), []
+        made.run(0.5, held=1.0)
+        random = np.random.default_rng(3)
+        for _ in range(150):
+            noise, motion = 0.5e-3 * random.standard_normal(3), to_and_fro * random.uniform(-1.0, 1.0)
+            made.run(0.2, held=1.0 + motion / SAG)
+            made.measure(made.tip + noise)
+            offsets.append(made.status.offset)
+        return float(np.std(offsets[50:], axis=0).max())
+
+    assert scatter(0.2e-3) < 1.05 * scatter(0.0)
+
+
+def test_a_motion_counts_but_for_the_slack_at_each_of_its_turns() -> None:
+    change, x = LoadChange(0.5e-3), np.array([1.0, 0.0, 0.0])
+    assert [1e3 * change.moved(1e-3 * place * x) for place in (4.0, 4.4, 3.6, 6.0, 8.0, 7.1, 5.0)] == pytest.approx(
+        [0.0, 0.0, 0.0, 1.5, 2.0, 0.0, 2.0]
+    )
 
 
 def test_late_measurement_is_compared_with_the_model_of_its_time() -> None:

@@ -23,6 +23,7 @@ from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.tip_observer.causes import wild, wrong_axes, wrong_stamp
 from gravcomp.tip_observer.error_filter import GATE, ErrorFilter
 from gravcomp.tip_observer.history import History, Prediction
+from gravcomp.tip_observer.load_change import LoadChange
 from gravcomp.tip_observer.motion_check import Disagreement, MotionCheck
 from gravcomp.tip_observer.options import TipObserverOptions
 
@@ -94,6 +95,7 @@ class TipObserver:
         """Forget the estimate."""
         self._filter = ErrorFilter(0.1 * self._allowed, self.options.model_error)
         self._before: Prediction | None = None  # of the last accepted measurement
+        self._by_gravity, self._by_cables = LoadChange(self.options.std), LoadChange(self.options.std)
         self._outliers: list[np.ndarray] = []
         self._pairs: collections.deque[tuple[np.ndarray, np.ndarray]] = collections.deque(maxlen=_WINDOW)
 
@@ -242,12 +244,11 @@ class TipObserver:
 
     def _diffuse(self, then: Prediction) -> None:
         """Let the estimate become uncertain with the time and the change of load since the last measurement."""
-        gravity, cables = then.gravity_part(self._rest_tip), then.cable_part()
+        gravity = then.gravity_part(self._rest_tip)
+        change = self._by_gravity.moved(gravity) + self._by_cables.moved(then.cable_part())
         self._largest_sag = max(self._largest_sag, float(np.linalg.norm(gravity)))
         if self._before is not None:
             elapsed = then.stamp - self._before.stamp
-            change = float(np.linalg.norm(gravity - self._before.gravity_part(self._rest_tip)))
-            change += float(np.linalg.norm(cables - self._before.cable_part()))
             self._filter.diffuse(
                 (self.options.drift * self._largest_sag) ** 2 * elapsed + _HYSTERESIS**2 * change * self._largest_sag,
                 self.options.model_error**2 * elapsed / self.options.forget,
