@@ -67,7 +67,7 @@ class Graph:
                 self.peers.spin_once(timeout_sec=0.01)
 
 
-def test_a_busy_controller_is_enabled_after_it_has_released(monkeypatch):
+def test_a_busy_controller_is_enabled_after_it_has_released():
     """Both requests would wait for it, and the one to enable be served first: the robot would stay released."""
     with Graph("relax_time:=1.0") as graph:
         graph.run(lambda: graph.judge._begin is not None)

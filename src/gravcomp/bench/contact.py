@@ -10,8 +10,8 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from gravcomp.bench.contact_lumens import is_lumen, moved_scene
-from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, scene_of, seeded_gravity
+from gravcomp.bench.contact_lumens import is_lumen, mesh_lumen
+from gravcomp.bench.contact_scenes import GRAVITY, moved_robot, random_scene, scene_of, seeded_gravity
 from gravcomp.bench.sampled_depth import sampled_depth
 from gravcomp.description import Elements, Material, Robot, Segment, load_robot_file
 from gravcomp.full_model.shape import Shape
@@ -158,7 +158,8 @@ class SceneMotion:
 
 def scene_motion(model: RobotModel, seed: int) -> SceneMotion | None:
     """Turn gravity in the scene of a seed, there and back. None where `solve` does not enter it from the straight robot."""
-    simulator, start = Simulator(model, reduced=False, scene=moved_scene(seed, model.robot)), seeded_gravity(seed)
+    scene = (mesh_lumen if is_lumen(seed) else random_scene)(seed, model.robot)
+    simulator, start = Simulator(model, reduced=False, scene=scene), seeded_gravity(seed)
     axis = np.random.default_rng(seed).standard_normal(3)
     axis /= np.linalg.norm(axis)
     angles = _TURN * np.concatenate([np.arange(_STEPS // 2), np.arange(_STEPS // 2 - 2, -1, -1)])

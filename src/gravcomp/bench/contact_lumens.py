@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gravcomp.bench.contact_scenes import random_scene, scene_of
+from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.description import Robot
 from gravcomp.scene.scene import Scene
 
@@ -21,11 +21,6 @@ _NOISE = (0.0, 0.02, 0.04)  # of the lumen's radius, in turns: standard deviatio
 def is_lumen(seed: int) -> bool:
     """Return whether the scene of a seed is a lumen from a mesh."""
     return seed % _EVERY == _EVERY - 1
-
-
-def moved_scene(seed: int, robot: Robot) -> Scene:
-    """Return the scene of a seed: one of `random_scene`, or a lumen from a mesh."""
-    return mesh_lumen(seed, robot) if is_lumen(seed) else random_scene(seed, robot)
 
 
 def mesh_lumen(seed: int, robot: Robot) -> Scene:
