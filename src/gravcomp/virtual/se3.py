@@ -174,3 +174,21 @@ def _rotation_log_near_pi(r: np.ndarray, out: np.ndarray) -> None:
     angle = math.atan2(sine, 0.5 * (r[0, 0] + r[1, 1] + r[2, 2] - 1.0))
     for i in range(3):
         out[i] = sign * angle * axis[i] / norm
+
+
+@njit(cache=True, error_model="numpy")
+def orthonormalise(rotation: np.ndarray, work: np.ndarray) -> None:
+    """Bring rotation (3, 3) to the nearest rotation by one Newton step, R (3 - R^T R) / 2; work (3, 3) is scratch.
+
+    This keeps rounding errors from adding up over hours.
+    """
+    for i in range(3):
+        for j in range(3):
+            product = 0.0
+            for k in range(3):
+                product += rotation[k, i] * rotation[k, j]
+            work[i, j] = (1.5 if i == j else 0.0) - 0.5 * product
+    for i in range(3):
+        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+        for j in range(3):
+            rotation[i, j] = a * work[0, j] + b * work[1, j] + c * work[2, j]

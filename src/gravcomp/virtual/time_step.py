@@ -34,9 +34,11 @@ from gravcomp.virtual.own_contact import (
     own_difference,
     take_own_over,
 )
+from gravcomp.virtual.possible_state import is_possible
 from gravcomp.virtual.rod import strains
 from gravcomp.virtual.routing import Routing, tendon_lengths
-from gravcomp.virtual.se3 import advance, copy_pose, motion_exp
+from gravcomp.virtual.se3 import advance, copy_pose, motion_exp, orthonormalise
+from gravcomp.virtual.section_inertia import add_inertia, add_inertia_to_band
 from gravcomp.virtual.surface import RodSurface
 from gravcomp.virtual.tendon_friction import tension_shares, update_sliding
 
@@ -47,8 +49,6 @@ _GAMMA = 0.5 + _ALPHA_F - _ALPHA_M
 _BETA = 0.25 * (_GAMMA + 0.5) ** 2
 _MOST_ITERATIONS, _MOST_AT_WALLS = 12, 40
 _WITH_FRICTION = 25  # iterations at walls; the others start again, and take the step without friction
-_LARGEST_TURN = 1.5  # rad in one element
-_LARGEST_VELOCITY = 2e3  # m/s and rad/s
 _LOOSER = 10.0  # than the static equilibrium, in force and moment
 _SEARCHES = 4  # for contacts in one step
 _NEAR = 0.05  # of the half width of the rod: so near to a wall a point takes part, and farther by twice its way in the step
@@ -220,8 +220,8 @@ def time_step(
             for i in range(6):
                 for c in range(m):
                     residual[k, i] += pull[6 * (k - 1) + i, c] * (law[c] - pulled[c])
-            _add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], centre[k], inertia[k])
-            _add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
+            add_inertia(residual[k], velocity[k], velocity_rate[k], mass[k], centre[k], inertia[k])
+            add_inertia_to_band(6 * (k - 1), beta, mass[k], centre[k], inertia[k], middle, band)
             for i in range(6):
                 worst = max(worst, abs(residual[k, i]) / tolerances[i // 3])
         if admissible and worst < _LOOSER and slack < _LOOSER * tolerances[0]:
@@ -263,14 +263,14 @@ def time_step(
             for k in range(6 * n):
                 pulled[c] += active[c] * gradient[k, c] * increment[k]
     for k in range(1, n + 1):
-        _orthonormalise(orientation[k], work)
+        orthonormalise(orientation[k], work)
         for i in range(6):
             if meets:
                 acceleration[k, i] = velocity_rate[k, i]
             else:
                 acceleration[k, i] += (1.0 - _ALPHA_F) / (1.0 - _ALPHA_M) * velocity_rate[k, i]
 
-    if not _is_possible(orientation, position, new_strain, velocity, length):
+    if not is_possible(orientation, position, new_strain, velocity, length):
         for k in range(n + 1):
             copy_pose(start_orientation[k], start_position[k], orientation[k], position[k])
         return False, False
@@ -358,92 +358,3 @@ def _predict_free(dt: float, velocity: np.ndarray, acceleration: np.ndarray, vel
             acceleration[k, i] = a
             velocity_rate[k, i] = 0.0
     return total_increment
-
-
-@njit(cache=True, error_model="numpy")
-def _is_possible(
-    orientation: np.ndarray, position: np.ndarray, strain: np.ndarray, velocity: np.ndarray, length: np.ndarray
-) -> bool:
-    """Return whether pose, strain and velocity are within physical bounds; written so that NaN is not possible."""
-    reach = 2.0 * np.sum(length)
-    possible = True
-    for k in range(orientation.shape[0]):
-        for i in range(3):
-            possible = possible and abs(position[k, i] - position[0, i]) < reach
-            for j in range(3):
-                possible = possible and abs(orientation[k, i, j]) < 1.0 + 1e-6
-        for i in range(6):
-            possible = possible and abs(velocity[k, i]) < _LARGEST_VELOCITY
-    for e in range(length.shape[0]):
-        for i in range(3, 6):
-            possible = possible and abs(strain[e, i]) * length[e] < _LARGEST_TURN
-    return possible
-
-
-@njit(cache=True, error_model="numpy")
-def _orthonormalise(rotation: np.ndarray, work: np.ndarray) -> None:
-    """Bring rotation (3, 3) to the nearest rotation by one Newton step, R (3 - R^T R) / 2; work (3, 3) is scratch.
-
-    This keeps rounding errors from adding up over hours.
-    """
-    for i in range(3):
-        for j in range(3):
-            product = 0.0
-            for k in range(3):
-                product += rotation[k, i] * rotation[k, j]
-            work[i, j] = (1.5 if i == j else 0.0) - 0.5 * product
-    for i in range(3):
-        a, b, c = rotation[i, 0], rotation[i, 1], rotation[i, 2]
-        for j in range(3):
-            rotation[i, j] = a * work[0, j] + b * work[1, j] + c * work[2, j]
-
-
-@njit(cache=True, error_model="numpy")
-def _add_inertia(
-    residual: np.ndarray, velocity: np.ndarray, rate: np.ndarray, mass: float, centre: np.ndarray, inertia: np.ndarray
-) -> None:
-    """Add M rate - ad_v^T M v of one cross-section to residual (6,).
-
-    mass in kg, its centre (3,) m, inertia (3, 3) kg m^2 about the axis. With the momenta
-    P = m (v + w x c) and L = m c x v + J w the force is M rate + (w x P, w x L + v x P).
-    """
-    v0, v1, v2, w0, w1, w2 = velocity[0], velocity[1], velocity[2], velocity[3], velocity[4], velocity[5]
-    c0, c1, c2 = centre[0], centre[1], centre[2]
-    p0, p1, p2 = mass * (v0 + w1 * c2 - w2 * c1), mass * (v1 + w2 * c0 - w0 * c2), mass * (v2 + w0 * c1 - w1 * c0)
-    q0 = mass * (c1 * v2 - c2 * v1) + inertia[0, 0] * w0 + inertia[0, 1] * w1 + inertia[0, 2] * w2
-    q1 = mass * (c2 * v0 - c0 * v2) + inertia[1, 0] * w0 + inertia[1, 1] * w1 + inertia[1, 2] * w2
-    q2 = mass * (c0 * v1 - c1 * v0) + inertia[2, 0] * w0 + inertia[2, 1] * w1 + inertia[2, 2] * w2
-    residual[0] += mass * (rate[0] + rate[4] * c2 - rate[5] * c1) + w1 * p2 - w2 * p1
-    residual[1] += mass * (rate[1] + rate[5] * c0 - rate[3] * c2) + w2 * p0 - w0 * p2
-    residual[2] += mass * (rate[2] + rate[3] * c1 - rate[4] * c0) + w0 * p1 - w1 * p0
-    residual[3] += mass * (c1 * rate[2] - c2 * rate[1]) + w1 * q2 - w2 * q1 + v1 * p2 - v2 * p1
-    residual[4] += mass * (c2 * rate[0] - c0 * rate[2]) + w2 * q0 - w0 * q2 + v2 * p0 - v0 * p2
-    residual[5] += mass * (c0 * rate[1] - c1 * rate[0]) + w0 * q1 - w1 * q0 + v0 * p1 - v1 * p0
-    for i in range(3):
-        for j in range(3):
-            residual[3 + i] += inertia[i, j] * rate[3 + j]
-
-
-@njit(cache=True, error_model="numpy")
-def _add_inertia_to_band(
-    row: int, beta: float, mass: float, centre: np.ndarray, inertia: np.ndarray, middle: int, band: np.ndarray
-) -> None:
-    """Add beta M of one cross-section, whose first row is `row`, to the band."""
-    m, x, y, z = beta * mass, beta * mass * centre[0], beta * mass * centre[1], beta * mass * centre[2]
-    for i in range(3):
-        band[row + i, middle] += m
-        for j in range(3):
-            band[row + 3 + i, middle + j - i] += beta * inertia[i, j]
-    # The upper right block is -m c^, the lower left one its transpose.
-    band[row, middle + 4] += z
-    band[row, middle + 5] -= y
-    band[row + 1, middle + 2] -= z
-    band[row + 1, middle + 4] += x
-    band[row + 2, middle + 1] += y
-    band[row + 2, middle + 2] -= x
-    band[row + 5, middle - 5] -= y
-    band[row + 5, middle - 4] += x
-    band[row + 3, middle - 2] -= z
-    band[row + 3, middle - 1] += y
-    band[row + 4, middle - 4] += z
-    band[row + 4, middle - 2] -= x
