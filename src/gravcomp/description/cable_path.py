@@ -63,24 +63,23 @@ def check_crossings(runs: Sequence[CableRun], pieces: Sequence[Piece]) -> None:
     widest = max((math.hypot(*place) for place in ends), default=0.0)
     # A path that turns back is not known from its arc length alone.
     onward = [r for r in runs if not r.cable.via_points or all(a[2] < b[2] for a, b in itertools.pairwise(r.cable.via_points))]
-    for one, other in itertools.combinations(onward, 2):
-        heights = sorted({s for run in (one, other) for s in _heights(run, pieces)})
-        low, high = max(one.start, other.start), min(one.end, other.end)
-        s = np.array([height for height in heights if low <= height <= high])
-        if len(s) < 2:
-            continue
-        apart = np.array([one.place(height) for height in s])
-        apart -= [other.place(height) for height in s]
-        if not apart.any() and (one.start, one.end) == (other.start, other.end):
-            raise ValueError(
-                f"the cables '{one.cable.name}' and '{other.cable.name}' are the same line; leave one out or move it"
-            )
-        place = _crossing(s, apart, np.array([_half_width(pieces, height, widest) for height in s]))
-        if place is not None:
-            raise ValueError(
-                f"the cables '{one.cable.name}' and '{other.cable.name}' cross at {place * 1e3:.4g} mm along the robot;"
-                " let their channels keep a distance"
-            )
+    s = np.array(sorted({height for run in onward for height in _heights(run, pieces)}))
+    if len(onward) < 2 or len(s) < 2:
+        return
+    # Beyond its ends the place of a cable is that at its end, and is not used.
+    places = np.array([[run.place(min(max(height, run.start), run.end)) for height in s.tolist()] for run in onward])
+    start, end = (np.array([getattr(run, name) for run in onward]) for name in ("start", "end"))
+    one, other = np.triu_indices(len(onward), 1)
+    low, high = np.maximum(start[one], start[other]), np.minimum(end[one], end[other])
+    both, apart = (s >= low[:, None]) & (s <= high[:, None]), places[one] - places[other]
+    same = (both.sum(axis=1) > 1) & (start[one] == start[other]) & (end[one] == end[other])
+    same &= ~(both & apart.any(axis=2)).any(axis=1)
+    crossed = _crossings(s, both, apart, np.array([_half_width(pieces, height, widest) for height in s.tolist()]))
+    for pair in np.flatnonzero(same | ~np.isnan(crossed))[:1]:
+        names = f"the cables '{onward[one[pair]].cable.name}' and '{onward[other[pair]].cable.name}'"
+        if same[pair]:
+            raise ValueError(f"{names} are the same line; leave one out or move it")
+        raise ValueError(f"{names} cross at {crossed[pair] * 1e3:.4g} mm along the robot; let their channels keep a distance")
 
 
 def _half_width(pieces: Sequence[Piece], s: float, otherwise: float) -> float:
@@ -99,22 +98,24 @@ def _via_heights(run: CableRun) -> list[float]:
     return [point[2] for point in run.cable.via_points or ()]
 
 
-def _crossing(s: np.ndarray, apart: np.ndarray, half_width: np.ndarray) -> float | None:
-    """The arc length at which the distance vectors (k, 2) at the arc lengths s (k,) pass through zero; None where none do.
+def _crossings(s: np.ndarray, both: np.ndarray, apart: np.ndarray, half_width: np.ndarray) -> np.ndarray:
+    """Return the first arc length (p,) at which the two cables of each pair come together and part again; nan where none do.
 
+    both (p, k): whether both cables are there at the arc lengths s (k,); apart (p, k, 2): the vectors from one to the other;
     half_width (k,) in m: of the sections there.
     """
     near = _CROSSING * 2 * half_width
-    distance = np.hypot(*apart.T)
-    for k in range(len(s) - 1):
-        step = apart[k + 1] - apart[k]
-        size = step @ step
-        at = min(max(-(apart[k] @ step) / size, 0.0), 1.0) if size else 0.0
-        # They come near within this stretch, and are apart before and after it.
-        apart_before, apart_after = (bool((distance[part] > near[part]).any()) for part in (slice(k + 1), slice(k + 1, None)))
-        if np.hypot(*(apart[k] + at * step)) < near[k] and apart_before and apart_after:
-            return float(s[k] + at * (s[k + 1] - s[k]))
-    return None
+    clear = both & (np.hypot(apart[..., 0], apart[..., 1]) > near)
+    step = np.diff(apart, axis=1)
+    size, along = (step**2).sum(axis=2), -(apart[:, :-1] * step).sum(axis=2)
+    part = np.clip(along / np.where(size > 0.0, size, 1.0), 0.0, 1.0)
+    nearest = apart[:, :-1] + part[..., None] * step
+    # They come near within a stretch, and are apart before and after it.
+    met = both[:, :-1] & both[:, 1:] & (np.hypot(nearest[..., 0], nearest[..., 1]) < near[:-1])
+    met &= np.logical_or.accumulate(clear, axis=1)[:, :-1]
+    met &= np.logical_or.accumulate(clear[:, ::-1], axis=1)[:, -2::-1]
+    pairs, first = np.arange(len(met)), met.argmax(axis=1)
+    return np.where(met.any(axis=1), s[first] + part[pairs, first] * (s[first + 1] - s[first]), np.nan)
 
 
 def _points(run: CableRun, piece: Piece) -> list[tuple[float, float, float]]:
@@ -132,7 +133,8 @@ def _places(run: CableRun, piece: Piece) -> list[float]:
     if run.cable.via_points is not None:
         return [s for _, _, s in _points(run, piece)]
     low, high = max(piece.start, run.start), min(piece.start + piece.length, run.end)
-    return [] if high - low <= 1e-9 else np.linspace(low, high, _PLACES).tolist()
+    step = (high - low) / (_PLACES - 1)
+    return [] if high - low <= 1e-9 else [*(low + k * step for k in range(_PLACES - 1)), high]
 
 
 def _check_wall(key: str, piece: Piece, x: float, y: float, s: float) -> None:

@@ -5,6 +5,7 @@ Frame `soft_base`: z runs along the straight robot from base to tip; the base is
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -167,10 +168,14 @@ class Robot:
         """Names of the cables in their order."""
         return tuple(c.name for c in self.cables)
 
+    @functools.cached_property
+    def _segment_ends(self) -> dict[str, float]:
+        """The z (m) of the distal end of each segment by name; the checks of the cables ask for it at each of their points."""
+        return dict(zip((s.name for s in self.segments), itertools.accumulate(s.full_length for s in self.segments)))
+
     def segment_end(self, name: str) -> float:
         """Return z (m) of the distal end of a segment, with its cap."""
-        names = [s.name for s in self.segments]
-        return sum(s.full_length for s in self.segments[: names.index(name) + 1])
+        return self._segment_ends[name]
 
     def cable_end(self, cable: Cable) -> float:
         """Return z (m) where the cable is fixed."""
