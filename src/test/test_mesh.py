@@ -8,6 +8,7 @@ from mesh_bodies import TAPERED_TUBE
 
 from gravcomp.description import Cap, Elements, Material, MeshBody, Robot, Segment, load_robot_file
 from gravcomp.mesh import MeshError, body_mesh, tube_mesh
+from gravcomp.mesh.elements import KINDS, jacobians, reference_nodes, shape_gradients, shape_values
 from gravcomp.mesh.embedding import embed
 from gravcomp.mesh.quality import mesh_quality
 from gravcomp.mesh.refinement import refined
@@ -36,6 +37,17 @@ def test_points_are_found_where_they_are():
     points = np.column_stack([3e-3 * np.cos(angle), 3e-3 * np.sin(angle), np.linspace(0.0, 0.1, 13)])
     found = embed(mesh, points)
     assert np.einsum("pa,pai->pi", found.weights, mesh.nodes[found.nodes]) == pytest.approx(points, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_jacobians_of_elements_are_derivatives_of_their_places(kind):
+    chance = np.random.default_rng(3)
+    nodes = reference_nodes(kind) + 0.1 * chance.standard_normal((4, *reference_nodes(kind).shape))
+    points, step = chance.uniform(0.1, 0.3, (5, 3)), 1e-6
+    found = jacobians(nodes, shape_gradients(kind, points))
+    for j, shift in enumerate(step * np.eye(3)):
+        ahead, behind = (shape_values(kind, points + sign * shift) for sign in (1, -1))
+        assert found[..., j] == pytest.approx(((ahead - behind) / (2 * step)) @ nodes, abs=1e-8)
 
 
 def test_sections_see_where_the_axis_goes():

@@ -108,20 +108,25 @@ class Tendons:
 
 def pieces_of(route: Route) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return nodes and weights d of every piece e_k between neighbouring points."""
-    pieces = []
+    shares: list[dict[int, float]] = []  # of the points in each piece
     for k in range(len(route.smooth) - 1):
         share = {k: -1.0, k + 1: 1.0}
         for middle, sign in ((k + 1, -1.0), (k, 1.0)):
             if route.smooth[middle]:
                 for point, factor in ((middle - 1, 1.0), (middle, -2.0), (middle + 1, 1.0)):
                     share[point] = share.get(point, 0.0) + sign * factor * _BEYOND_CHORD
-        nodes = np.concatenate([route.points.nodes[point] for point in share])
-        signed = np.concatenate([factor * route.points.weights[point] for point, factor in share.items()])
-        unique, inverse = np.unique(nodes, return_inverse=True)
-        weights = np.bincount(inverse, signed)
-        used = weights != 0.0
-        pieces.append((unique[used], weights[used]))
-    return pieces
+        shares.append(share)
+    points = np.array([point for share in shares for point in share], dtype=np.int64)
+    factors = np.array([factor for share in shares for factor in share.values()])
+    nodes, signed = route.points.nodes[points], factors[:, None] * route.points.weights[points]
+    # Piece and node as one number: the nodes of all pieces are sorted at once.
+    count = int(route.points.nodes.max(initial=0)) + 1
+    piece = np.repeat(np.arange(len(shares)), [len(share) for share in shares])
+    unique, inverse = np.unique(piece[:, None] * count + nodes, return_inverse=True)
+    weights = np.bincount(inverse.ravel(), signed.ravel())
+    unique, weights = unique[weights != 0.0], weights[weights != 0.0]
+    ends = np.searchsorted(unique, count * np.arange(1, len(shares)))
+    return list(zip(np.split(unique % count, ends), np.split(weights, ends)))
 
 
 def _groups(pieces: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from gravcomp.mechanics.block_matrix import BlockPattern
 from gravcomp.mesh import Mesh, MeshError
-from gravcomp.mesh.elements import shape_gradients
+from gravcomp.mesh.elements import jacobians, shape_gradients
 
 
 def reference_geometry(mesh: Mesh, points: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -13,13 +13,16 @@ def reference_geometry(mesh: Mesh, points: np.ndarray, weights: np.ndarray) -> t
     Raises MeshError for inverted or flat elements.
     """
     local = shape_gradients(mesh.kind, points)
-    jacobian = np.einsum("kai,paj->kpij", mesh.nodes[mesh.elements], local)
+    jacobian = jacobians(mesh.nodes[mesh.elements], local)
     volume = np.linalg.det(jacobian)
     if (volume <= 0).any():
         bad = np.flatnonzero((volume <= 0).any(axis=1))
         raise MeshError(f"{len(bad)} of {len(volume)} elements are inverted or flat (the first is number {bad[0]})")
-    gradients = np.einsum("paj,kpji->kpia", local, np.linalg.inv(jacobian))
-    return np.ascontiguousarray(gradients), volume * weights
+    outward = np.linalg.inv(jacobian).swapaxes(2, 3)  # (k, p, i, j): derivative of the local coordinate j by X_i
+    gradients = np.empty((*outward.shape[:3], local.shape[1]))
+    for p, at_point in enumerate(local):  # one product of matrices for all elements
+        gradients[:, p] = (outward[:, p].reshape(-1, 3) @ at_point.T).reshape(len(outward), 3, -1)
+    return gradients, volume * weights
 
 
 def scatter_positions(elements: np.ndarray, pattern: BlockPattern) -> np.ndarray:

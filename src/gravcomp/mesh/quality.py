@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 
-from gravcomp.mesh.elements import constant_strain, edges, reference_nodes, shape_gradients, stiffness_quadrature
+from gravcomp.mesh.elements import constant_strain, edges, jacobians, reference_nodes, shape_gradients, stiffness_quadrature
 from gravcomp.mesh.mesh import Mesh
 
 
@@ -29,7 +29,7 @@ def mesh_quality(mesh: Mesh) -> MeshQuality:
     corners = mesh.nodes[mesh.elements]
     # Evaluated at the quadrature points and at the nodes, where the Jacobian of a tetrahedron has its extremes.
     points = np.vstack([stiffness_quadrature(mesh.kind).points, reference_nodes(mesh.kind)])
-    volume = np.linalg.det(np.einsum("kai,paj->kpij", corners, shape_gradients(mesh.kind, points)))
+    volume = np.linalg.det(jacobians(corners, shape_gradients(mesh.kind, points)))
     jacobian_ratio = float((volume.min(axis=1) / volume.max(axis=1)).min())
     begin, end = edges(mesh.kind).T
     lengths = np.linalg.norm(corners[:, begin] - corners[:, end], axis=2)

@@ -9,6 +9,7 @@ A body that ends in a rounding has no section at its tip: there points of its la
 On a body whose axis is bent at rest, Z is the arc length along the axis, and the section is perpendicular to it there.
 """
 
+import functools
 import hashlib
 import threading
 from collections import OrderedDict
@@ -128,30 +129,38 @@ def _in_layer(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray, np.nda
     slack = 1e-9 * mesh.length
     layer = (low < height - slack) & (high >= height - slack) if height > slack else low <= slack
     elements = mesh.elements[layer]
-    x, w = _GAUSS
-    a, b = (grid.ravel() for grid in np.meshgrid(x, x, indexing="ij"))
     part = np.clip(2.0 * (height - low[layer]) / (high - low)[layer] - 1.0, -1.0, 1.0)
     part[np.abs(np.abs(part) - 1.0) < 1e-9] = np.sign(part[np.abs(np.abs(part) - 1.0) < 1e-9])
-    grid = np.empty((len(elements), 9, 3))
-    grid[..., 0], grid[..., 1], grid[..., 2] = a, b, part[:, None]
-    straight = mesh.straight[elements]
-    places = np.einsum("kqc,kci->kqi", shape_values("hex20", grid), straight)
-    jacobian = np.einsum("kci,kqcj->kqij", straight[..., :2], shape_gradients("hex20", grid)[..., :2])
-    area = np.abs(np.linalg.det(jacobian)) * np.outer(w, w).ravel()
-    local, nodes = grid.reshape(-1, 3), np.repeat(elements, 9, axis=0)
-    plane = places[..., :2].reshape(-1, 2)
+    parts, which = np.unique(np.round(part, 12), return_inverse=True)  # mostly one: the elements lie between the same planes
+    grid, values, slopes = (np.array(arrays)[which] for arrays in zip(*map(_gauss_points, parts.tolist())))
+    straight = mesh.straight[elements][..., :2]
+    jacobian = (straight.swapaxes(1, 2) @ slopes).reshape(-1, 2, 9, 2).swapaxes(1, 2)
+    area = np.abs(np.linalg.det(jacobian)) * np.outer(_GAUSS[1], _GAUSS[1]).ravel()
+    nodes, weights = np.repeat(elements, 9, axis=0), values.reshape(-1, 20)
+    plane = (values @ straight).reshape(-1, 2)
     if mesh.axis.bent:
         # Between its end faces a quadratic element follows an arc only nearly: the points are found where they lie.
         points = mesh.axis.points(np.column_stack([plane, np.full(len(plane), height)]))
         tolerance = 1e-9 * mesh.length
-        local, distance, found = local_coordinates_from("hex20", mesh.nodes[nodes], points, tolerance, local)
+        local, distance, found = local_coordinates_from("hex20", mesh.nodes[nodes], points, tolerance, grid.reshape(-1, 3))
         if not found.all():
             raise MeshError(
                 f"the section at {height * 1e3:g} mm does not lie in its elements, by {distance.max() * 1e3:.3g} mm:"
                 " use more elements along the robot"
             )
         local[np.abs(np.abs(local) - 1.0) < 1e-9] = np.sign(local[np.abs(np.abs(local) - 1.0) < 1e-9])
-    return plane, area.ravel(), nodes, shape_values("hex20", local)
+        weights = shape_values("hex20", local)
+    return plane, area.ravel(), nodes, weights
+
+
+@functools.lru_cache(maxsize=256)
+def _gauss_points(part: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Local coordinates (9, 3) of the Gauss points of a hexahedron's section at the local coordinate `part`.
+
+    Also returns its shape functions there (9, 20), and their derivatives (20, 18) by the first two coordinates, point by point.
+    """
+    grid = np.array([(a, b, part) for a in _GAUSS[0] for b in _GAUSS[0]])
+    return grid, shape_values("hex20", grid), shape_gradients("hex20", grid)[..., :2].transpose(1, 0, 2).reshape(20, 18)
 
 
 def _on_rings(mesh: Mesh, height: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
