@@ -54,16 +54,14 @@ def _candidates() -> list[tuple[np.ndarray, str]]:
 
 
 CANDIDATES = _candidates()
-_MATRICES = np.array(
-    [matrix * SCALES[scale] for matrix, scale in CANDIDATES]
-    + [scale * np.eye(3) for scale in RATE_SCALES.values()]
-    + [np.zeros((3, 3))]  # no turns
-)
+_MATRICES = np.array([matrix for matrix, _ in CANDIDATES[:: len(SCALES)]])
+_NEGATED = (np.linalg.det(_MATRICES) < 0.0).astype(int)
+# Factors of the rates: those of the candidates and negated, those of the rate's scale, and the one without turns.
+_SIGNED = 2 * len(SCALES)
+_FACTORS = np.array([sign * scale for scale in SCALES.values() for sign in (1.0, -1.0)] + [*RATE_SCALES.values(), 0.0])
 _UNITS = (1.0, math.pi / 180.0, math.pi / 180e3)  # rad/s in the units that the rates may have
-# The unit of each matrix, as its number in _UNITS.
-_UNIT = np.array(
-    [_UNITS.index(SCALES[scale]) if scale.endswith("deg/s") else 0 for _, scale in CANDIDATES] + [0] * (len(RATE_SCALES) + 1)
-)
+# The unit of each factor, as its number in _UNITS.
+_UNIT = np.array([_UNITS.index(abs(f)) if abs(f) in _UNITS else 0 for f in _FACTORS])
 
 
 class Axes:
@@ -217,30 +215,49 @@ class Axes:
         force = accel[:whole].reshape(-1, count, 3).mean(axis=1) / length
         self._find_biases(rate, force, duration)
         biases = np.array([np.zeros(3) if bias is None else bias for bias in self._biases])
-        # By matrix products, which take a tenth of the time of sums over the same indices.
-        turns = (rate @ _MATRICES.reshape(-1, 3).T).reshape(len(rate), -1, 3)
-        turns = (turns - (_MATRICES @ biases[_UNIT][:, :, None])[:, :, 0]) * duration
-        matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(_MATRICES), 3, 3)
+        turns = _FACTORS[:, None] * (rate[:, None] - biases[_UNIT]) * duration
+        matrices = Rotation.from_rotvec(turns.reshape(-1, 3)).as_matrix().reshape(len(rate), len(_FACTORS), 3, 3)
         orientations = np.empty_like(matrices)
-        orientation = np.broadcast_to(np.eye(3), (len(_MATRICES), 3, 3))
+        orientation = np.broadcast_to(np.eye(3), (len(_FACTORS), 3, 3))
         for m in range(len(rate)):
             orientation = orientations[m] = orientation @ matrices[m]
-        turned = (orientations.reshape(len(force), -1, 3) @ force[:, :, None]).reshape(turns.shape)
-        means = turned.reshape(WINDOWS, -1, len(_MATRICES), 3).mean(axis=1)
-        scatter = np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=2), axis=0)
-        candidates, scales = scatter[: len(CANDIDATES)], slice(len(CANDIDATES), -1)
+        parts = _mean_parts(orientations, force)
+        means = np.trace(parts, axis1=3, axis2=4)  # of the turned force
+        candidates, scatter, scales = _scatter_of_candidates(parts), _scatter(means), slice(_SIGNED, -1)
+        turned = (orientations[:, scales] @ force[:, None, :, None])[..., 0]
         weight = 1.0 / (STILL**2 + min(candidates[: len(SCALES)].min(), scatter[scales].min()))
         self._scatter = self._scatter + weight * np.append(candidates, scatter[-1])
         self._turning += candidates.max()
         self._as_given += candidates[0]
         self._stretches += 1.0
-        self._rate.take(
-            orientations[:, scales] * duration, turned[:, scales], weight, WINDOWS, rested=self._biases[0] is not None
-        )
+        self._rate.take(orientations[:, scales] * duration, turned, weight, WINDOWS, rested=self._biases[0] is not None)
         up = np.einsum("mji,wj->wmi", orientations[:, 0], means[:, 0]).reshape(WINDOWS, WINDOWS, -1, 3)
         lengths = np.linalg.norm(means[:, 0], axis=1)
         directions = up[range(WINDOWS), range(WINDOWS)].mean(axis=1) / lengths[:, None]
         self._windows += np.column_stack([length * lengths, directions]).tolist()
+
+
+def _mean_parts(orientations: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """Return the means (w, f, 3, 3, 3) over the windows of R_rj a_i, for orientations R (m, f, 3, 3) and the force a (m, 3)."""
+    inside = len(force) // WINDOWS
+    entries = orientations.reshape(WINDOWS, inside, -1).swapaxes(1, 2)
+    return (entries @ force.reshape(WINDOWS, inside, 3) / inside).reshape(WINDOWS, -1, 3, 3, 3)
+
+
+def _scatter_of_candidates(parts: np.ndarray) -> np.ndarray:
+    """Return the scatter of each of the CANDIDATES from the `_mean_parts` of all factors.
+
+    With rates P w the orientation is P R P^T, where R is that by the rates w, negated where det P is: a signed permutation of
+    the axes turns or mirrors all rotations alike. So the force turned back is P R P^T a, whose scatter is that of R P^T a.
+    """
+    means = parts[:, :_SIGNED].swapaxes(3, 4).reshape(WINDOWS, _SIGNED, 3, 9) @ _MATRICES.reshape(-1, 9).T
+    scatter = _scatter(means.swapaxes(2, 3)).reshape(len(SCALES), 2, -1)
+    return scatter[:, _NEGATED, np.arange(len(_MATRICES))].T.ravel()
+
+
+def _scatter(means: np.ndarray) -> np.ndarray:
+    """Return the scatter (...,) of the means (w, ..., 3) of the windows about their mean."""
+    return np.mean(np.sum((means - means.mean(axis=0)) ** 2, axis=-1), axis=0)
 
 
 def _median(values: np.ndarray) -> np.ndarray:
