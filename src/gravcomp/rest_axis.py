@@ -67,6 +67,14 @@ class RestAxis:
             start += arc.length
         return position, rotation
 
+    def curvature(self, s: np.ndarray) -> np.ndarray:
+        """Return the curvatures (n, 2) in 1/m towards x and y of the sections at the arc lengths s (n,)."""
+        if not self.arcs:
+            return np.zeros((len(s), 2))
+        values = np.array([(np.cos(arc.plane), np.sin(arc.plane)) for arc in self.arcs])
+        values *= np.array([[arc.angle / arc.length] for arc in self.arcs])
+        return values[np.searchsorted(np.cumsum([arc.length for arc in self.arcs[:-1]]), s, side="right")]
+
 
 STRAIGHT = RestAxis()
 """The axis of a robot that is straight at rest."""
@@ -81,7 +89,9 @@ def straightened(axis: RestAxis, points: np.ndarray, length: float) -> np.ndarra
         position, rotation = axis.frames(at)
         offset = points - position
         change = np.einsum("ni,ni->n", offset, rotation[:, :, 2])
-        at = at + change
+        # Newton's step: a section inside of a bend is nearer than the arc is long. It is at most doubled.
+        across = np.einsum("ni,nij->nj", offset, rotation[:, :, :2])
+        at = at + change / np.maximum(1.0 - (across * axis.curvature(at)).sum(axis=1), 0.5)
         if np.abs(change).max() < 1e-14 * length:
             break
     position, rotation = axis.frames(at)

@@ -113,21 +113,17 @@ def _nearest(
 
 def _arcs(outline: Outline | BlendedOutline, lumens: list[Outline], index: int, cornered: bool) -> list[tuple[int, float, float]]:
     """The borders of a region: label, and the angles (rad) from which to which it reaches; counterclockwise."""
-
-    def label(angle: float) -> int:
-        return int(_nearest(outline, lumens, index, np.array([angle]), cornered)[1][0])
-
     angle = 2 * math.pi * (np.arange(_RAYS) + 0.37) / _RAYS  # no ray goes along an axis of symmetry
     labels = _nearest(outline, lumens, index, angle, cornered)[1]
-    changes = []
-    for k in np.flatnonzero(labels != np.roll(labels, -1)):
-        low, high = float(angle[k]), float(angle[k] + 2 * math.pi / _RAYS)
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            low, high = (middle, high) if label(middle) == labels[k] else (low, middle)
-        changes.append(((low + high) / 2, int(labels[(k + 1) % _RAYS])))
-    following = [*(at for at, _ in changes[1:]), changes[0][0] + 2 * math.pi]
-    return [(begun, low, high) for (low, begun), high in zip(changes, following)]
+    last = np.flatnonzero(labels != np.roll(labels, -1))  # the rays before a change
+    low, high = angle[last], angle[last] + 2 * math.pi / _RAYS
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        before = _nearest(outline, lumens, index, middle, cornered)[1] == labels[last]
+        low, high = np.where(before, middle, low), np.where(before, high, middle)
+    changes = ((low + high) / 2).tolist()
+    begun = labels[(last + 1) % _RAYS].tolist()
+    return list(zip(begun, changes, [*changes[1:], changes[0] + 2 * math.pi]))
 
 
 def _without_short_borders(diagram: Diagram, outline: Outline | BlendedOutline, lumens: list[Outline]) -> Diagram:
