@@ -8,8 +8,11 @@ import yaml
 
 from gravcomp.config.errors import ConfigError
 
+_DEEPEST = 200
+"""Values within values: PyYAML's own reader takes a time that grows with the square of the depth, until Python's stack ends."""
+
 _LARGEST = 10_000
-"""Characters that begin a value in another one, in a document for libyaml: a nesting of 100,000 overflows its stack."""
+"""Characters that begin a value in another one, so few that libyaml can make the values: 100,000 in each other end its stack."""
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -45,12 +48,24 @@ def load_yaml(path: str | Path) -> Any:
     return parse_yaml(text, path)
 
 
+def _refuse_depth(text: str) -> None:
+    """Raise RecursionError where the values that are read before an error are nested too deeply."""
+    depth = 0
+    with contextlib.suppress(yaml.YAMLError):  # it will be raised again, more precisely
+        for event in yaml.parse(text, Loader=_FastLoader):
+            depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+            if depth > _DEEPEST:
+                raise RecursionError
+
+
 def parse_yaml(text: str, source: str | Path) -> Any:
     """Return the document in the text. Raises ConfigError, which begins with `source`, when it is not YAML."""
     try:
-        if sum(map(text.count, "[{-?:")) < _LARGEST:
-            with contextlib.suppress(yaml.YAMLError):
-                return yaml.load(text, Loader=_FastLoader)
+        if sum(map(text.count, "[{-?:")) >= _LARGEST:
+            _refuse_depth(text)
+        with contextlib.suppress(yaml.YAMLError):
+            return yaml.load(text, Loader=_FastLoader)
+        _refuse_depth(text)
         return yaml.load(text, Loader=_StrictLoader)
     except RecursionError as error:
         raise ConfigError(f"{source}: is nested too deeply") from error
