@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from gravcomp.description import Elements, Material, Payload, Robot, Segment, load_robot_file
+from gravcomp.full_model.applied_load import AppliedLoad
 from gravcomp.full_model.law_range import beyond_range
 from gravcomp.full_model.shifted_factor import ShiftedFactor
+from gravcomp.full_model.statics import StaticSolver
 from gravcomp.inverse import InverseController, straight_target
 from gravcomp.mechanics.block_matrix import BlockMatrix, NotPositiveDefinite
+from gravcomp.mechanics.total_lagrangian import SolidElements
 from gravcomp.simulation import RobotModel, ShapeStatus, Simulator
 
 G = 9.81
@@ -274,6 +277,31 @@ def test_a_shape_beyond_the_range_of_its_law_is_reported(law, message):
     u[:, 2] = -0.45 * model.mesh.nodes[:, 2]
     assert message in beyond_range(model, u) and bool(beyond_range(model, u)) == bool(message)
     assert not beyond_range(model, 0.5 * u)
+
+
+def test_a_tangent_that_fails_again_is_assembled_once(simulator, monkeypatch):
+    """A first failure, whose tangent has to be assembled again, does not count."""
+    tracker, assembled, factor = StaticSolver(simulator.model), [], BlockMatrix.factor
+
+    def failing(matrix: BlockMatrix):
+        """Fail without a shift."""
+        factors.append(1)
+        if len(factors) == 1:
+            matrix.values[:] = np.nan
+            raise NotPositiveDefinite
+        return factor(matrix)
+
+    assemble, factors = SolidElements.assemble, []
+    monkeypatch.setattr(SolidElements, "assemble", lambda *args: assembled.append(1) or assemble(*args))
+    monkeypatch.setattr(BlockMatrix, "factor", failing)
+    load = AppliedLoad(simulator.model.weight(np.array([0.0, 0.0, -9.81])), None, 1.0)
+    solved = []
+    for expected in (2, 1, 1):
+        assembled.clear(), factors.clear()
+        found, _, exact = tracker._new_factor(tracker.state, load, None, stable=False)
+        solved.append(found.solve(np.ones(simulator.model.pattern.n)))
+        assert len(assembled) == expected and not exact
+    assert solved[1] == pytest.approx(solved[0], rel=1e-9) and solved[2] == pytest.approx(solved[0], rel=1e-9)
 
 
 def test_an_indefinite_tangent_gets_the_smallest_shift_that_helps_with_two_factorisations_where_the_last_one_is_still_it(

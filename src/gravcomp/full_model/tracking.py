@@ -81,6 +81,7 @@ class StaticTracker:
         self._contained: list[np.ndarray] = []  # of the loads that turn, in the last factor
         self._springs: tuple[tuple[float, ...], ...] = ()  # that the kept factor holds, see `AppliedLoad.springs`
         self._kept: tuple[BlockCholesky, np.ndarray] | None = None  # a factor, and the displacements (n, 3) where it was made
+        self._failed = False  # whether the last new tangent was not positive definite
         self._before: np.ndarray | None = None  # displacements (n, 3) of the equilibrium before the current one
         count = self.model.tendons.count
         u = np.zeros_like(self.model.mesh.nodes)
@@ -360,13 +361,21 @@ class StaticTracker:
         self._kept = None  # the storage of that factor is written over
         force = self._assemble(state, load, origin)
         sections = [] if self.contact is None else self.contact.pressed_sections()
+        # The factorisation writes over it. Where the last one failed, this one often fails as well.
+        tangent = self._matrix.values.copy() if self._failed else None
         try:
-            return self._matrix.factor(), force, True
+            factor = self._matrix.factor()
+            self._failed = False
+            return factor, force, True
         except NotPositiveDefinite:
+            self._failed = True
             if stable and not sections:
                 raise
-        self._assemble(state, load, origin)  # again, as the factorisation writes over it
-        tangent = self._matrix.values.copy()
+        if tangent is None:
+            self._assemble(state, load, origin)
+            tangent = self._matrix.values.copy()
+        else:
+            self._matrix.values[:] = tangent
         supported = self._supported_factor(sections)
         if supported is not None:
             return supported, force, True

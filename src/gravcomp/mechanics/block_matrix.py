@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
-from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 if TYPE_CHECKING:
@@ -206,13 +206,20 @@ class BlockCholesky:
             if i:
                 below = self._coupling[i - 1]
                 part -= below @ parts[-1][-below.shape[1] :]
-            parts.append(dtrsm(1.0, block, part, lower=1, overwrite_b=1))
+            parts.append(_solve_lower(block, part))
         for i in range(len(parts) - 1, -1, -1):
             if i < len(self._coupling):
                 below = self._coupling[i]
                 parts[i][-below.shape[1] :] -= below.T @ parts[i + 1]
-            parts[i] = dtrsm(1.0, self._diagonal[i], parts[i], lower=1, trans_a=1, overwrite_b=1)
+            parts[i] = _solve_lower(self._diagonal[i], parts[i], transposed=1)
         return np.concatenate(parts).reshape(b.shape)
+
+
+def _solve_lower(block: np.ndarray, right: np.ndarray, transposed: int = 0) -> np.ndarray:
+    """Solve with the lower triangle (n, n), or its transpose, for right-hand sides (n, k), which are overwritten."""
+    if right.shape[1] == 1:  # in half the time
+        return dtrsv(block, right[:, 0], lower=1, trans=transposed, overwrite_x=1)[:, None]
+    return dtrsm(1.0, block, right, lower=1, trans_a=transposed, overwrite_b=1)
 
 
 def order_in_levels(cliques: list[np.ndarray], n_nodes: int, clamped: np.ndarray) -> tuple[np.ndarray, BlockPattern]:
