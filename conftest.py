@@ -50,6 +50,11 @@ FIRST = (
     "test_contact",
     "test_reduction",
     "test_calibrate_command",
+    "test_swept_bodies",
+    "test_statics",
+    "test_inverse_recovery",
+    "test_bridge",
+    "test_inverse",
 )
 _OF_A_TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE")  # they wrap and colour output
 _LOCK = "GRAVCOMP_TEST_LOCK"  # environment variable with the file that the processes of a run lock

@@ -24,6 +24,7 @@ NAMES = ("s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3")
 ANGLES = np.radians([0, 120, 240, 60, 180, 300])
 STATIONS = np.linspace(0.0, 1.0, 9)
 _POINTS_A_SEGMENT = 16
+_HALVES = 0.5 * np.arange(1, 2 * _POINTS_A_SEGMENT + 1)  # middles and ends of its pieces
 
 LIMITS = Limits(tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, tension_rate=1e3, displacement_rate=0.05)
 
@@ -47,19 +48,28 @@ def cable_jacobian() -> np.ndarray:
 
 
 def centre_line(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (..., 33, 3), base to tip, and directions there (..., 33, 3), for coordinates (..., 6), by the midpoint rule."""
+    """Points (..., 33, 3), base to tip, and directions there (..., 33, 3), for coordinates (..., 6), by the midpoint rule.
+
+    A segment lies in a plane: its directions are sums of two, `ahead` at its begin and `aside`, toward which it bends.
+    """
     q = np.asarray(q)
-    position, frame = np.zeros((*q.shape[:-1], 3)), np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
-    positions, directions = [position], [frame[..., :, 2]]
+    position, frame = np.zeros((*q.shape[:-1], 1, 3)), np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+    positions, directions = [position], [frame[..., None, :, 2]]
     h = SEGMENT / _POINTS_A_SEGMENT
-    for segment in (q[..., :3], q[..., 3:]):
-        half, full = _rotation(0.5 * h * segment[..., :2]), _rotation(h * segment[..., :2])
-        for _ in range(_POINTS_A_SEGMENT):
-            position = position + h * (1.0 + segment[..., 2:]) * (frame @ half)[..., :, 2]
-            frame = frame @ full
-            positions.append(position)
-            directions.append(frame[..., :, 2])
-    return np.stack(positions, axis=-2), np.stack(directions, axis=-2)
+    for segment in np.split(q, 2, axis=-1):
+        curvature = np.maximum(np.hypot(segment[..., 0], segment[..., 1]), 1e-12)[..., None]
+        toward = segment[..., :2] / curvature
+        aside, ahead = (frame[..., :2] @ toward[..., None])[..., None, :, 0], frame[..., None, :, 2]
+        sine, cosine = np.sin(curvature * h * _HALVES)[..., None], np.cos(curvature * h * _HALVES)[..., None]
+        step = h * (1.0 + segment[..., 2, None, None])
+        gone = [step * np.cumsum(part[..., ::2, :], axis=-2) for part in (sine, cosine)]
+        positions.append(position + gone[0] * aside + gone[1] * ahead)
+        directions.append(sine[..., 1::2, :] * aside + cosine[..., 1::2, :] * ahead)
+        position, end = positions[-1][..., -1:, :], directions[-1][..., -1, :]
+        # The frame turns in the plane of `aside` and `ahead`; what is across it stays.
+        change = (cosine[..., -1, :] - 1.0) * aside[..., 0, :] - sine[..., -1, :] * ahead[..., 0, :]
+        frame = np.concatenate([frame[..., :2] + change[..., None] * toward[..., None, :], end[..., None]], axis=-1)
+    return np.concatenate(positions, axis=-2), np.concatenate(directions, axis=-2)
 
 
 def effector(q: np.ndarray) -> np.ndarray:
@@ -99,15 +109,6 @@ class ArcRobot:
             displacement_free=jacobian @ self.q - compliance_aa @ self.tension,
             effector_free=effector(self.q) - compliance_ea @ self.tension,
         )
-
-
-def _rotation(bend: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) that turn z toward bend (..., 2) by its length in rad."""
-    angle = np.linalg.norm(bend, axis=-1)
-    x, y = np.moveaxis(bend / np.maximum(angle, 1e-12)[..., None], -1, 0)
-    s, c = np.sin(angle), np.cos(angle)
-    rows = [[1 + (c - 1) * x * x, (c - 1) * x * y, s * x], [(c - 1) * x * y, 1 + (c - 1) * y * y, s * y], [-s * x, -s * y, c]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _weight_energy(q: np.ndarray) -> np.ndarray:

@@ -21,10 +21,10 @@ def by_hand(duration=60.0, turning=1.0, seed=1):
     time = np.arange(int(duration * RATE)) / RATE
     rate = turning * np.stack([np.sin(0.31 * time + p) for p in chance.uniform(0.0, 6.0, 3)], axis=1)
     attitude = np.empty((len(time), 3, 3))
-    now = Rotation.identity()
-    for k, w in enumerate(rate):
-        attitude[k] = now.as_matrix()
-        now = now * Rotation.from_rotvec(w / RATE)
+    now = np.eye(3)
+    for k, turn in enumerate(Rotation.from_rotvec(rate / RATE).as_matrix()):
+        attitude[k] = now
+        now = now @ turn
     moved = np.stack([2.0 * np.sin(3.0 * time + p) for p in (0.0, 1.0, 2.0)], axis=1)  # m/s^2
     accel = np.einsum("kji,kj->ki", attitude, moved + np.array([0.0, 0.0, STANDARD_GRAVITY])) + 0.02 * chance.standard_normal(
         (len(time), 3)

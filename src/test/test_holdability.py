@@ -314,8 +314,14 @@ def test_motors_that_are_weaker_than_the_limit_of_tension_are_named(tmp_path):
     assert "pull 1.5 N at most, at their current limit of 0.05 A" in weak_motors(hardware, Limits(tension_max=1.6))
 
 
-def test_a_loop_asks_a_process_of_its_own(monkeypatch):
-    monkeypatch.setattr(background, "give_way", lambda: None)  # the lowest priority waits minutes for the other tests
+@pytest.fixture
+def promptly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With processes of usual priority: at the lowest one they wait seconds to minutes for the other tests."""
+    monkeypatch.setattr(background, "give_way", lambda: None)
+
+
+@pytest.mark.usefixtures("promptly")
+def test_a_loop_asks_a_process_of_its_own():
     question = HoldProcess(arm(tension_max=0.5), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH))
     while question.running:
         time.sleep(0.02)
@@ -325,6 +331,7 @@ def test_a_loop_asks_a_process_of_its_own(monkeypatch):
     question.stop()
 
 
+@pytest.mark.usefixtures("promptly")
 @pytest.mark.parametrize(("cables", "ended"), [(3, True), (0, False)])
 def test_a_question_that_is_ended_or_fails_has_no_answer(cables, ended):
     robot = arm()
@@ -338,6 +345,7 @@ def test_a_question_that_is_ended_or_fails_has_no_answer(cables, ended):
     assert question.poll() is None
 
 
+@pytest.mark.usefixtures("promptly")
 def test_a_process_that_hangs_or_cannot_be_started_has_no_answer(monkeypatch):
     """A lock that another thread holds at the fork stays locked: the kernel ends the process."""
     lock, question = threading.Lock(), (arm(), np.array([-9.81, 0.0, 0.0]), straight_target(_LENGTH))

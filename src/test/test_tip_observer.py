@@ -20,6 +20,7 @@ from gravcomp.virtual.tracker import VirtualTracker
 
 ROBOT = load_robot_file("article").robot
 REST = np.array([0.0, 0.0, ROBOT.length])
+STRAIGHT = straight_target(ROBOT.length)
 SAG = 0.03  # m, released and horizontal
 STEP = 0.01  # s
 START = 1.7e9  # s, a stamp of these years
@@ -49,7 +50,7 @@ class Model:
                 effector_free=np.append(REST + sag, [0.0, 0.0, 1.0]),
             )
             self.observer.predict(self.time, self.tip, UPRIGHT, response, np.array([self.held]), self.touching)
-            corrected = self.observer.corrected(straight_target(ROBOT.length), self.time)
+            corrected = self.observer.corrected(STRAIGHT, self.time)
             if not self.touching and self.held > 0.0:
                 self.moved = corrected.tip_position - REST
 
