@@ -1,6 +1,7 @@
 """Robots for the tests of the virtual robot."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from gravcomp.virtual.true_robot import TrueRobot
 GRAVITY = 9.81
 
 
+@functools.cache
 def article() -> tuple[Robot, Hardware]:
     file = load_robot_file("article")
     return file.robot, file.hardware
@@ -27,6 +29,7 @@ def reference_robot() -> Robot:
     return dataclasses.replace(robot, segments=tuple(dataclasses.replace(s, lumen_diameter=3e-3) for s in robot.segments))
 
 
+@functools.cache
 def given() -> VirtualRobotParameters:
     """What the article's robot file gives: nothing is drawn but the noise."""
     file = load_robot_file("article")
