@@ -28,6 +28,7 @@ from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.training.compliance import compliances
 from gravcomp.training.images import with_images
 from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
 from gravcomp.training.trained_shapes import TrainedShapes, evenly
@@ -44,22 +45,23 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
-    they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
-    addition to those of the modes; decomposed: largest number of snapshots to decompose, strained: and to find the principal
-    strains in; integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from
-    `points` up to `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends
-    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to
-    test with.
+    they do not represent; strains: number of principal strains in addition to those of the modes; more_strains: more of them
+    where such a robot has a law with points: its strains are large; decomposed: largest number of snapshots to decompose,
+    strained: and to find the principal strains in; integrated: number of shapes to choose the cubature of the law's deviation
+    with, cubature its tolerance; from `points` up to `board_points`, for which the board has room, twice the tolerance is
+    enough; represented: the training ends when the modes of earlier paths represent new ones to this part of the length;
+    training and test: motions to train and to test with.
     """
 
     modes: int = 44
     loaded_modes: int = 12
     more_modes: int = 12
     strains: int = 36
+    more_strains: int = 20
     decomposed: int = 1100
     strained: int = 500
     integrated: int = 150
-    cubature: float = 1.5e-4
+    cubature: float = 1e-4
     points: int = 120
     board_points: int = 128
     represented: float = 2e-4
@@ -106,7 +108,7 @@ def trained(
         raise MeshError(reason)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
-    most_modes = modes + (options.more_modes if exact else 0)
+    most_modes = modes + options.more_modes
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
@@ -154,15 +156,18 @@ def trained(
         basis = np.ascontiguousarray(basis[:, :modes])
     progress("integrating", 0.0)
     shown = shapes.rows[evenly(len(found), options.decomposed)]
-    elasticity = strain_polynomials(model.elements, basis, shown[evenly(len(shown), options.strained)], options.strains)
+    strains = options.strains + (0 if exact or basis.shape[1] == modes else options.more_strains)
+    elasticity = strain_polynomials(model.elements, basis, shown[evenly(len(shown), options.strained)], strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
     coordinates = shapes.coordinates(basis)
     cubature = Cubature.none()
     if not exact:
         sections = section_changes(model, basis)[:, 0] / model.length
-        some = coordinates[evenly(len(found), options.integrated)]
-        cubature = choose(model.elements, basis, some, sections, options.cubature, (options.points, options.board_points))
+        some = evenly(len(found), options.integrated)
+        compliance = compliances(model, basis, [found[number] for number in some])
+        enough = options.points, options.board_points
+        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, enough)
     return Reduction(
         basis=basis,
         elasticity=elasticity,
