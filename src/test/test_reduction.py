@@ -27,6 +27,7 @@ from gravcomp.training import BuildOptions, TrainingOptions, build
 from gravcomp.training.build import trained
 from gravcomp.training.compliance import compliances
 from gravcomp.training.samples import Sample, _start, samples
+from gravcomp.training.trained_shapes import TrainedShapes
 
 
 @pytest.fixture(scope="module")
@@ -85,6 +86,23 @@ def test_basis_is_orthonormal_in_energy_and_holds_its_snapshots(modes):
     again = energy_basis(shapes, matrix.multiply, 10)
     assert again.shape[1] == 3
     assert again @ (again.T @ matrix.multiply(shapes.T)) == pytest.approx(shapes.T, abs=1e-9)
+
+
+def test_trained_shapes_are_multiplied_by_the_stiffness_once_for_all_that_is_asked(modes, monkeypatch):
+    model, matrix, basis, shapes = modes
+    none = np.zeros(model.tendons.count)
+    samples, multiply = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes], BlockMatrix.multiply
+    multiplied: list[int] = []
+    monkeypatch.setattr(BlockMatrix, "multiply", lambda own, x: multiplied.append(x.shape[1]) or multiply(own, x))
+    trained_shapes = TrainedShapes.of(samples, matrix)
+    few = [energy_basis(trained_shapes.rows, matrix.multiply, 2, alike, trained_shapes.gram()) for alike in (False, True)]
+    coordinates, missing = trained_shapes.coordinates(basis), trained_shapes.part(slice(0, 4)).missing(few[0])
+    assert sorted(multiplied) == [2, 2, len(shapes)]  # a basis itself is once more, against rounding
+    monkeypatch.undo()
+    for of, alike in zip(few, (False, True)):
+        assert of == pytest.approx(energy_basis(shapes, matrix.multiply, 2, alike), abs=1e-12 * np.abs(of).max())
+    assert coordinates @ basis.T == pytest.approx(shapes, abs=1e-9)
+    assert few[0].T @ matrix.multiply(missing.T) == pytest.approx(np.zeros((2, 4)), abs=1e-9) and np.abs(missing).max() > 1e-6
 
 
 def test_large_snapshots_leave_modes_for_small_ones():
