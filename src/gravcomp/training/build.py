@@ -166,8 +166,8 @@ def trained(
         sections = section_changes(model, basis)[:, 0] / model.length
         some = evenly(len(found), options.integrated)
         compliance = compliances(model, basis, [found[number] for number in some])
-        enough = options.points, options.board_points
-        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, enough)
+        room = options.points, options.board_points
+        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, room)
     return Reduction(
         basis=basis,
         elasticity=elasticity,
