@@ -25,7 +25,9 @@ from gravcomp.reduction.strain_polynomials import strain_at, strain_polynomials,
 from gravcomp.simulation import DynamicSimulator, DynamicsOptions, RobotModel, ShapeStatus, Simulator
 from gravcomp.training import BuildOptions, TrainingOptions, build
 from gravcomp.training.build import trained
+from gravcomp.training.compliance import compliances
 from gravcomp.training.samples import Sample, _start, samples
+from gravcomp.training.trained_shapes import TrainedShapes
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +86,23 @@ def test_basis_is_orthonormal_in_energy_and_holds_its_snapshots(modes):
     again = energy_basis(shapes, matrix.multiply, 10)
     assert again.shape[1] == 3
     assert again @ (again.T @ matrix.multiply(shapes.T)) == pytest.approx(shapes.T, abs=1e-9)
+
+
+def test_trained_shapes_are_multiplied_by_the_stiffness_once_for_all_that_is_asked(modes, monkeypatch):
+    model, matrix, basis, shapes = modes
+    none = np.zeros(model.tendons.count)
+    samples, multiply = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes], BlockMatrix.multiply
+    multiplied: list[int] = []
+    monkeypatch.setattr(BlockMatrix, "multiply", lambda own, x: multiplied.append(x.shape[1]) or multiply(own, x))
+    trained_shapes = TrainedShapes.of(samples, matrix)
+    few = [energy_basis(trained_shapes.rows, matrix.multiply, 2, alike, trained_shapes.gram()) for alike in (False, True)]
+    coordinates, missing = trained_shapes.coordinates(basis), trained_shapes.part(slice(0, 4)).missing(few[0])
+    assert sorted(multiplied) == [2, 2, len(shapes)]  # a basis itself is once more, against rounding
+    monkeypatch.undo()
+    for of, alike in zip(few, (False, True)):
+        assert of == pytest.approx(energy_basis(shapes, matrix.multiply, 2, alike), abs=1e-12 * np.abs(of).max())
+    assert coordinates @ basis.T == pytest.approx(shapes, abs=1e-9)
+    assert few[0].T @ matrix.multiply(missing.T) == pytest.approx(np.zeros((2, 4)), abs=1e-9) and np.abs(missing).max() > 1e-6
 
 
 def test_large_snapshots_leave_modes_for_small_ones():
@@ -265,17 +284,20 @@ def test_a_path_begins_with_the_hanging_robot_where_one_search_finds_no_equilibr
     assert (way <= 0.0).all() and (way > -30.1).all() and len(way) >= 6  # in steps
 
 
-@pytest.mark.parametrize(("law", "represented", "size"), [("svk", 1e-9, 7), ("svk", 1.0, 4), ("neo_hookean", 1e-9, 4)])
-def test_a_law_without_points_gets_more_modes_where_the_others_do_not_represent_the_shapes(
-    robot, monkeypatch, law, represented, size
+@pytest.mark.parametrize(
+    ("law", "represented", "size", "strains"),
+    [("svk", 1e-9, 7, 2), ("svk", 1.0, 4, 2), ("neo_hookean", 1e-9, 7, 5), ("neo_hookean", 1.0, 4, 2)],
+)
+def test_there_are_more_modes_where_the_others_do_not_represent_the_shapes_and_more_strains_with_them(
+    robot, monkeypatch, law, represented, size, strains
 ):
     model = RobotModel(robot.with_material(law=law))
     shapes = 1e-4 * model.length * np.random.default_rng(0).normal(size=(12, 3 * model.n_free))
     none = np.zeros(model.tendons.count)
     found = [Sample(shape, np.zeros(3), none, none, np.zeros(7)) for shape in shapes]
     monkeypatch.setattr(sys.modules["gravcomp.training.build"], "samples", lambda *args, **turns: found)
-    options = BuildOptions(modes=4, more_modes=3, strains=2, represented=represented, integrated=2)
-    assert trained(model, options).basis.shape[1] == size
+    options = BuildOptions(modes=4, more_modes=3, strains=2, more_strains=3, represented=represented, integrated=2)
+    assert trained(model, options).elasticity.linear.shape == (size, size + strains)
 
 
 @pytest.mark.parametrize(
@@ -358,18 +380,51 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
     model, _, every = with_law(modes, "neo_hookean")
     _, _, basis, _ = modes
     coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
-    sections = section_changes(model, basis)[:, 0] / model.length
-    rough, fine = (choose(model.elements, basis, coordinates, sections, tolerance, (999, 999)) for tolerance in (1e-3, 3e-5))
+    sections, compliance = section_changes(model, basis)[:, 0] / model.length, np.tile(np.eye(3), (40, 1, 1))
+
+    def chosen(tolerance: float, enough: tuple[int, int], compliance: np.ndarray = compliance) -> Cubature:
+        return choose(model.elements, basis, coordinates, compliance, sections, tolerance, enough)
+
+    rough, fine = (chosen(tolerance, (999, 999)) for tolerance in (1e-3, 3e-5))
     assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
     assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
     # Where a number of points is enough, twice the error is allowed; where it is not, the error counts.
-    every_point, enough = (
-        choose(model.elements, basis, coordinates, sections, 3e-5, (few, few)) for few in (1, len(fine.weight) - 1)
-    )
+    every_point, enough = (chosen(3e-5, (few, few)) for few in (1, len(fine.weight) - 1))
     assert every_point.error <= 3e-5 and len(enough.weight) <= len(fine.weight) and enough.error <= 6e-5
     few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
     for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
         assert deviation_at(few, q).force == pytest.approx(deviation_at(every, q).force, abs=0.05 * largest)
+
+
+def test_forces_that_are_in_error_where_a_shape_is_stiff_move_nothing(modes):
+    model, _, _ = with_law(modes, "neo_hookean")
+    _, _, basis, _ = modes
+    coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
+    sections, soft = section_changes(model, basis)[:, 0] / model.length, np.tile(np.eye(3), (40, 1, 1))
+    stiff = soft @ np.diag([1.0, 1e-3, 1e-3])
+    of_soft, of_stiff = (
+        choose(model.elements, basis, coordinates, compliance, sections, 3e-5, (999, 999)) for compliance in (soft, stiff)
+    )
+    assert len(of_stiff.weight) < 0.8 * len(of_soft.weight) and of_stiff.error <= 3e-5
+
+
+def test_the_compliance_of_a_sample_is_that_of_the_full_model(built):
+    """A force on the modes moves the equilibrium by it, tensions given; at rest it is the identity."""
+    model, reduction = built
+    basis, none, gravity = reduction.basis, np.zeros(model.tendons.count), np.array([-9.81, 0.0, 0.0])
+    at_rest = Sample(np.zeros(3 * model.n_free), np.zeros(3), none, none, np.zeros(7))
+    tension = np.linspace(0.3, 0.0, len(none))
+    shapes = [Simulator(model.robot, reduced=False) for _ in range(2)]
+    for simulator, pull in zip(shapes, (gravity, gravity * 1.001)):
+        simulator.solver.tolerance = 1e-9 * model.length
+        assert simulator.solve(pull, tension=tension).is_equilibrium
+    bent, moved = (model.free(simulator.displacements).copy() for simulator in shapes)
+    rest, found = compliances(model, basis, [at_rest, Sample(bent, gravity, tension, none, np.zeros(7))])
+    assert rest == pytest.approx(np.eye(len(rest)), abs=1e-8)
+    force = basis.T @ np.kron(model.nodal_weight[: model.n_free], 1e-3 * gravity)
+    wanted = section_changes(model, (moved - bent)[:, None])[-1, 0, :, 0]
+    assert section_changes(model, basis)[-1, 0] @ found @ force == pytest.approx(wanted, abs=0.02 * np.linalg.norm(wanted))
+    assert np.linalg.norm(section_changes(model, basis)[-1, 0] @ force - wanted) > 0.05 * np.linalg.norm(wanted)
 
 
 def test_twice_the_error_is_enough_at_every_number_of_points_that_the_board_has_room_for():

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
-from scipy.linalg.blas import dsyrk, dtrsm, dtrsv
+from scipy.linalg.blas import dsymm, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 if TYPE_CHECKING:
@@ -152,18 +152,18 @@ class BlockMatrix:
     def multiply(self, x: np.ndarray) -> np.ndarray:
         """Return A x for x (n,) or (n, k). Only valid before `factor`."""
         x = np.asarray(x, dtype=float)
-        result = np.zeros_like(x)
+        columns = x.reshape(len(x), -1)
+        result = np.zeros_like(columns)
         start = self.pattern.start
         for i, block in enumerate(self._diagonal):
             rows = slice(start[i], start[i + 1])
-            lower = np.tril(block)
-            result[rows] += lower @ x[rows] + np.tril(block, -1).T @ x[rows]
+            result[rows] += dsymm(1.0, block, columns[rows], lower=1)
             if i < len(self._coupling):
                 below = slice(start[i + 1], start[i + 2])
                 seen = slice(start[i + 1] - self._coupling[i].shape[1], start[i + 1])
-                result[below] += self._coupling[i] @ x[seen]
-                result[seen] += self._coupling[i].T @ x[below]
-        return result
+                result[below] += self._coupling[i] @ columns[seen]
+                result[seen] += self._coupling[i].T @ columns[below]
+        return result.reshape(x.shape)
 
     def sparse(self) -> "csr_array":
         """Return the whole matrix, both triangles, for many products. Only valid before `factor`."""

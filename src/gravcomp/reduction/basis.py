@@ -22,14 +22,18 @@ _SMALL = 1e-2
 
 
 def energy_basis(
-    snapshots: np.ndarray, stiffness: Callable[[np.ndarray], np.ndarray], modes: int, alike: bool = False
+    snapshots: np.ndarray,
+    stiffness: Callable[[np.ndarray], np.ndarray],
+    modes: int,
+    alike: bool = False,
+    gram: np.ndarray | None = None,
 ) -> np.ndarray:
     """Return the basis Phi (n, r) of the snapshots (s, n), orthonormal in the stiffness.
 
-    stiffness: multiplies (n, k) by K_0; alike: each snapshot counts with the norm 1. r is `modes`, or fewer if the snapshots have
-    a lower rank.
+    stiffness: multiplies (n, k) by K_0; alike: each snapshot counts with the norm 1; gram (s, s): G, where it is known. r is
+    `modes`, or fewer if the snapshots have a lower rank.
     """
-    gram = snapshots @ stiffness(snapshots.T)
+    gram = snapshots @ stiffness(snapshots.T) if gram is None else gram
     norm = np.sqrt(np.diag(gram))
     size = 1.0 / np.maximum(norm, max(_SMALL * float(np.median(norm)), np.finfo(float).tiny)) if alike else np.ones(len(norm))
     basis = snapshots.T @ (size[:, None] * principal_combinations(size[:, None] * gram * size, modes))

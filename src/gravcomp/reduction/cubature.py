@@ -5,8 +5,10 @@ the weights solve
 
     min |W (sum_p w_p a_p - b)|,    b = sum over all points with their true weights,    w >= 0,    few of them not zero.
 
-The stiffness is nearly the identity in the coordinates q, so a force df that is in error moves the observed sections by S df:
-W^T W = S^T S / (n L^2) + beta^2 I measures the error of n sections as a fraction of the length L, and a little of all others.
+With the stiffness K_s of the body and its cables at the shape s, a force df that is in error moves the observed sections by
+X df, X = S K_s^-1: W^T W = X^T X / (n L^2) + beta^2 K_s^-1 measures the error of n sections as a fraction of the length L, and a
+little energy. At a bent shape the stiffness is not that of the straight robot: what stretches the shape or changes its volume may
+bend the straight one, and is hundreds of times as stiff; forces that are in error there move nothing.
 
 Of the two usual methods, energy-conserving sampling of elements (C. Farhat et al., IJNME 98, 2014) and empirical cubature at
 points (J. A. Hernandez, M. A. Caicedo, A. Ferrer, CMAME 313, 2017), this is the second: an element has eight points, so a choice
@@ -33,8 +35,8 @@ _CANDIDATES, _AT_ONCE = 3000, 200
 _ROUNDING = 1e-14
 # The square of a column's part across the others, over its own, below which it depends on them.
 _DEPENDENT = 1e-12
-# beta as a fraction of the root of the trace of the sections' part.
-_OTHERS = 0.1
+# beta, where the traces of both parts are equal.
+_OTHERS = 0.03
 
 
 @dataclass(frozen=True)
@@ -71,19 +73,18 @@ def choose(
     elements: SolidElements,
     basis: np.ndarray,
     coordinates: np.ndarray,
+    compliance: np.ndarray,
     sections: np.ndarray,
     tolerance: float,
     enough: tuple[int, int],
 ) -> Cubature:
     """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
 
-    sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length; tolerance: largest `error` of
-    the result; enough: smallest and largest number of points that are enough where they leave at most twice as much.
+    compliance (s, r, r): K_s^-1; sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length;
+    tolerance: largest `error` of the result; enough: smallest and largest number of points that are enough where they leave at
+    most twice as much.
     """
-    observed = sections.reshape(-1, basis.shape[1])
-    metric = observed.T @ observed / len(sections)
-    metric += _OTHERS**2 * np.trace(metric) * np.eye(len(metric))
-    weighing = np.linalg.cholesky(metric).T
+    weighing = _weighing(compliance, sections)
     element, point = (index.ravel() for index in np.indices(elements.weights.shape))
     weight = elements.weights.ravel()
     shuffled = np.random.default_rng(0).permutation(len(weight))
@@ -100,6 +101,17 @@ def choose(
     chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root, enough)
     at = candidates[chosen]
     return Cubature(element[at], point[at], found, left / root)
+
+
+def _weighing(compliance: np.ndarray, sections: np.ndarray) -> np.ndarray:
+    """Return W (s, r, r) for the compliances (s, r, r) and the change of the sections (n, 3, r)."""
+    weighing = np.empty_like(compliance)
+    for to, of in zip(weighing, compliance):
+        moved = sections.reshape(-1, len(of)) @ of
+        metric = moved.T @ moved / len(sections)
+        metric += _OTHERS**2 * np.trace(metric) / np.trace(of) * of
+        to[:] = np.linalg.cholesky(metric).T
+    return weighing
 
 
 def sparse_weights(
@@ -241,13 +253,13 @@ def _forces(
     element: np.ndarray,
     point: np.ndarray,
 ) -> np.ndarray:
-    """Return W a (s r, p) of some points, for W (r, r) and coordinates (s, r)."""
+    """Return W a (s r, p) of some points, for W (s, r, r) and coordinates (s, r)."""
     gradient = mode_gradients(elements, basis, element, point)
     deformation = np.einsum("pija,sa->spij", gradient, coordinates, optimize=True) + np.eye(3)
     piola = np.empty_like(deformation)
     _piola(deformation, elements.constants.law[element], _constants(elements, element), piola)
-    weighed = np.einsum("pija,ka->pijk", gradient, weighing, optimize=True)
-    return np.einsum("spij,pijk->skp", piola, weighed, optimize=True).reshape(-1, len(element))
+    forces = np.einsum("spij,pija->sap", piola, gradient, optimize=True)
+    return (weighing @ forces).reshape(-1, len(element))
 
 
 @njit(cache=True, fastmath=REORDERED)

@@ -28,8 +28,10 @@ from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
 from gravcomp.reduction.tracking import ReducedTracker
+from gravcomp.training.compliance import compliances
 from gravcomp.training.images import with_images
 from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
+from gravcomp.training.trained_shapes import TrainedShapes, evenly
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
@@ -43,22 +45,23 @@ class BuildOptions:
     """Size of a reduction and of its training.
 
     modes: r; loaded_modes: more of them for a robot that carries external loads; more_modes: and for one whose trained shapes
-    they do not represent, if its law takes no points, so that a step has time for them; strains: number of principal strains in
-    addition to those of the modes; decomposed: largest number of snapshots to decompose, strained: and to find the principal
-    strains in; integrated: number of shapes to choose the cubature of the law's deviation with, cubature its tolerance; from
-    `points` up to `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends
-    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to
-    test with.
+    they do not represent; strains: number of principal strains in addition to those of the modes; more_strains: more of them
+    where such a robot has a law with points: its strains are large; decomposed: largest number of snapshots to decompose,
+    strained: and to find the principal strains in; integrated: number of shapes to choose the cubature of the law's deviation
+    with, cubature its tolerance; from `points` up to `board_points`, for which the board has room, twice the tolerance is
+    enough; represented: the training ends when the modes of earlier paths represent new ones to this part of the length;
+    training and test: motions to train and to test with.
     """
 
     modes: int = 44
     loaded_modes: int = 12
     more_modes: int = 12
     strains: int = 36
+    more_strains: int = 20
     decomposed: int = 1100
     strained: int = 500
     integrated: int = 150
-    cubature: float = 1.5e-4
+    cubature: float = 1e-4
     points: int = 120
     board_points: int = 128
     represented: float = 2e-4
@@ -105,29 +108,28 @@ def trained(
         raise MeshError(reason)
     modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
-    most_modes = modes + (options.more_modes if exact else 0)
+    most_modes = modes + options.more_modes
     matrix = model.new_matrix()
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     maps = symmetries(model)
 
-    def missed(basis: np.ndarray, some: list[Sample]) -> np.ndarray:
-        """Return what the modes (n, r) miss of each sample (s,): at the section where it is most, over the length."""
-        shapes = _shapes(some).T
-        missing = shapes - basis @ (basis.T @ matrix.multiply(shapes))
-        apart: np.ndarray = np.linalg.norm(section_changes(model, missing)[:, 0], axis=1).max(axis=0) / model.length
+    def missed(basis: np.ndarray, some: TrainedShapes) -> np.ndarray:
+        """Return what the modes (n, r) miss of each shape (s,): at the section where it is most, over the length."""
+        apart: np.ndarray = np.linalg.norm(section_changes(model, some.missing(basis).T)[:, 0], axis=1).max(axis=0) / model.length
         return apart
 
-    def represent(basis: np.ndarray, some: list[Sample], most: float) -> bool:
-        """Return whether the modes (n, r) represent the share `most` of the samples."""
+    def represent(basis: np.ndarray, some: TrainedShapes, most: float) -> bool:
+        """Return whether the modes (n, r) represent the share `most` of the shapes."""
         return bool(np.quantile(missed(basis, some), most) <= options.represented)
 
-    def basis_of(some: list[Sample]) -> np.ndarray:
-        """Return as many modes (n, r) of the samples as the robot may have, the most important ones first.
+    def basis_of(some: TrainedShapes) -> np.ndarray:
+        """Return as many modes (n, r) of the shapes as the robot may have, the most important ones first.
 
-        Of modes for the energy and modes to which each sample counts alike: those that miss less of the samples (mean square).
+        Of modes for the energy and modes to which each shape counts alike: those that miss less of the shapes (mean square).
         """
-        shapes = evenly(_shapes(some), options.decomposed)
-        both = [energy_basis(shapes, matrix.multiply, most_modes, alike=alike) for alike in (False, True)]
+        shown = some.part(evenly(len(some.rows), options.decomposed))
+        gram = shown.gram()
+        both = [energy_basis(shown.rows, matrix.multiply, most_modes, alike, gram) for alike in (False, True)]
         return min(both, key=lambda basis: float(np.mean(missed(basis, some) ** 2)))
 
     def enough(earlier: list[Sample], new: list[Sample]) -> bool:
@@ -135,8 +137,9 @@ def trained(
         earlier = with_images(earlier, maps)
         if len(earlier) < most_modes or not new:
             return False
-        every = earlier + with_images(new, maps)
-        return represent(basis_of(earlier), new, _MOST_NEW) or not represent(basis_of(every), new, _MOST_NEW)
+        every = TrainedShapes.of(earlier + with_images(new, maps), matrix)
+        before, unseen = every.part(slice(len(earlier))), every.part(slice(len(earlier), None, 1 + len(maps)))
+        return represent(basis_of(before), unseen, _MOST_NEW) or not represent(basis_of(every), unseen, _MOST_NEW)
 
     turns = 1 + sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in maps)
     computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, turns=turns)
@@ -147,20 +150,24 @@ def trained(
             " the robot may be too soft for its weight"
         )
     progress("decomposing", 0.0)
-    shapes = evenly(_shapes(found), options.decomposed)
-    basis = basis_of(found)
-    if represent(basis[:, :modes], found, _MOST_TRAINED):
+    shapes = TrainedShapes.of(found, matrix)
+    basis = basis_of(shapes)
+    if represent(basis[:, :modes], shapes, _MOST_TRAINED):
         basis = np.ascontiguousarray(basis[:, :modes])
     progress("integrating", 0.0)
-    elasticity = strain_polynomials(model.elements, basis, evenly(shapes, options.strained), options.strains)
+    shown = shapes.rows[evenly(len(found), options.decomposed)]
+    strains = options.strains + (0 if exact or basis.shape[1] == modes else options.more_strains)
+    elasticity = strain_polynomials(model.elements, basis, shown[evenly(len(shown), options.strained)], strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
-    coordinates = _shapes(found) @ matrix.multiply(basis)
+    coordinates = shapes.coordinates(basis)
     cubature = Cubature.none()
     if not exact:
         sections = section_changes(model, basis)[:, 0] / model.length
-        shown = evenly(coordinates, options.integrated)
-        cubature = choose(model.elements, basis, shown, sections, options.cubature, (options.points, options.board_points))
+        some = evenly(len(found), options.integrated)
+        compliance = compliances(model, basis, [found[number] for number in some])
+        room = options.points, options.board_points
+        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, room)
     return Reduction(
         basis=basis,
         elasticity=elasticity,
@@ -173,16 +180,6 @@ def trained(
         error_median=np.nan,
         error_worst=np.nan,
     )
-
-
-def _shapes(of: list[Sample]) -> np.ndarray:
-    """Return the displacements (s, 3 n_free) of samples."""
-    return np.array([sample.unknowns for sample in of])
-
-
-def evenly(rows: np.ndarray, count: int) -> np.ndarray:
-    """Return at most `count` of the rows, evenly spaced."""
-    return rows[np.linspace(0, len(rows) - 1, min(count, len(rows))).astype(int)]
 
 
 @contextlib.contextmanager
