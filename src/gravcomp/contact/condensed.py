@@ -41,7 +41,8 @@ _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before
 _STIFF = 1e-2  # of the stiffness that forces which turn have to leave, to be part of a step
 _RUNAWAY = 2.0  # of the largest force: growth in a step along which the sum has no minimum
 _SMALL = 1e-12  # m of slack that is rounding error
-_ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
+_ROUNDS, _AGREED, _NEARLY = 30, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
+_SHRINKS, _LEAST_PART = 0.5, 0.05  # change of a round, of that of the last one, that is none to and fro; part of one that is taken
 
 
 @njit(cache=True)
@@ -166,26 +167,25 @@ def _rub(
     force: np.ndarray,
 ) -> bool:  # fmt: skip
     """Find forces with friction; returns whether limits and normal forces agree. rub (c, 2): first guess of the friction."""
+    limit, change, before, part, largest = friction * force[m : m + c], np.zeros(c), np.zeros(c), 1.0, np.inf
     for i in range(c):
-        for v in range(2):
-            k = m + c + 2 * i + v
-            high[k], low[k] = friction[i] * force[m + i], -friction[i] * force[m + i]
-            force[k] = rub[i, v]
-    change = np.inf
-    for _ in range(_ROUNDS):
+        force[m + c + 2 * i : m + c + 2 * i + 2] = rub[i]
+    for turn in range(_ROUNDS):
+        for i in range(c):
+            for k in range(m + c + 2 * i, m + c + 2 * i + 2):
+                high[k], low[k] = limit[i], -limit[i]
         if not _bounded(w, q, low, high, force):
             return False
-        change, largest = 0.0, 1e-300
-        for i in range(c):
-            limit = friction[i] * force[m + i]
-            for v in range(2):
-                k = m + c + 2 * i + v
-                change, largest = max(change, abs(limit - high[k])), max(largest, limit)
-                high[k], low[k] = limit, -limit
-        change /= largest
-        if change <= _AGREED:
+        wanted = friction * force[m : m + c]
+        before[:], change[:], last = change, wanted - limit, largest
+        largest = np.abs(change).max() / max(wanted.max(), 1e-300)
+        if largest <= _AGREED:
             break
-    return change <= _NEARLY
+        if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between, see `alternation`
+            turned = before - change
+            part = min(max(part * (before @ turned) / (turned @ turned), _LEAST_PART), 1.0)
+        limit = np.maximum(limit + part * change, 0.0)
+    return largest <= _NEARLY
 
 
 @njit(cache=True)

@@ -176,7 +176,7 @@ class FullContact:
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, last.force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin - self.allowed, last.force)
         own = None if self.own is None else self.own.rows(sections, moved, self.margin, last.own)
         if not len(places.row) and own is None:
             state.compliance, state.answer = compliance, answer
