@@ -183,7 +183,7 @@ def _rub(
             break
         if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between, see `alternation`
             turned = before - change
-            part = min(max(part * (before @ turned) / (turned @ turned), _LEAST_PART), 1.0)
+            part = min(max(part * (before @ turned) / max(turned @ turned, 1e-300), _LEAST_PART), 1.0)
         limit = np.maximum(limit + part * change, 0.0)
     return largest <= _NEARLY
 

@@ -5,6 +5,8 @@ right-hand sides of the factor that the step has anyway, A X = C^T, next to thos
 dense: the compliance S of cables and places, from which forces and states follow (`contact.condensed`).
 """
 
+import contextlib
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -90,6 +92,15 @@ class FullContact:
     def sections(self, u: np.ndarray) -> np.ndarray:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
         return (self._rows @ (self._model.mesh.nodes + u)).reshape(-1, 3, 3)
+
+    @contextlib.contextmanager
+    def without_friction(self) -> Iterator[None]:
+        """Leave friction out meanwhile."""
+        rubbing, self.rubbing = self.rubbing, False
+        try:
+            yield
+        finally:
+            self.rubbing = rubbing
 
     @property
     def longest(self) -> float:
