@@ -56,11 +56,11 @@ class StaticSolver(StaticTracker):
 
         if self.contact is None or not self._rubs:
             return loaded(0.0, 1.0, _PART, depth)
-        done, state = 0.0, self.state
+        done = 0.0
         if depth:
             with self.contact.without_friction():
                 done, state = _RUBBING_PART, loaded(0.0, _RUBBING_PART, _PART * _RUBBING_PART, depth)
-        if state.converged:
+        if not depth or state.converged:
             state = loaded(done, 1.0, _RUBBING_PART, 0.0)
         if state.converged:
             return state
