@@ -36,7 +36,7 @@ def test_a_robot_is_put_into_a_lumen_with_friction(model, seed):
 
 
 def test_only_places_near_walls_count_while_the_walls_are_lowered(model):
-    """At first the lowered walls touch the straight robot where it is deepest; most of it is farther from them than the margin."""
+    """At first the lowered walls touch the straight robot where it is deepest; most of it is far from them."""
     scene, gravity = mesh_lumen(59, model.robot), seeded_gravity(59)
     solver = Simulator(model, reduced=False, scene=scene).solver
     depth = solver.contact.depth(np.zeros_like(model.mesh.nodes))

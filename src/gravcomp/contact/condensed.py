@@ -23,7 +23,8 @@ forces and friction together. Its states, at a bound or between, are changed all
 (J. Judice, F. Pires, 1994), and one at a time, the last wrong one, where that leaves as many wrong ones (K. Murty, 1974). Where
 that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped and halved until they lower the
 sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The limits follow from the normal
-forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
+forces found, in a few rounds (P. Panagiotopoulos, 1975). Where two places take the force from one another in turns, a part of
+each change is taken (B. Irons, R. Tuck, 1969). The number of solves is bounded.
 
 Next to convex obstacles D is positive, and the robot may be balanced as on top of a ball. Where the forces that turn overcome
 the stiffness, they are left out: the steps then lead away from such a shape. It is no solution where it would be left.
@@ -42,7 +43,7 @@ _STIFF = 1e-2  # of the stiffness that forces which turn have to leave, to be pa
 _RUNAWAY = 2.0  # of the largest force: growth in a step along which the sum has no minimum
 _SMALL = 1e-12  # m of slack that is rounding error
 _ROUNDS, _AGREED, _NEARLY = 30, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
-_SHRINKS, _LEAST_PART = 0.5, 0.05  # change of a round, of that of the last one, that is none to and fro; part of one that is taken
+_SHRINKS, _LEAST_PART = 0.5, 0.05  # part of the last round's change to which the next one has to shrink; least part taken of one
 
 
 @njit(cache=True)
@@ -181,7 +182,7 @@ def _rub(
         largest = np.abs(change).max() / max(wanted.max(), 1e-300)
         if largest <= _AGREED:
             break
-        if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between, see `alternation`
+        if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between
             turned = before - change
             part = min(max(part * (before @ turned) / max(turned @ turned, 1e-300), _LEAST_PART), 1.0)
         limit = np.maximum(limit + part * change, 0.0)

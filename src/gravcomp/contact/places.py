@@ -193,9 +193,9 @@ def _write_place(
             # The gap's slope along the robot follows from its gradient; its bend is at first that of the stations.
             ahead = 0.0
             for n in range(4):
+                of = sections[first + n]
                 for j in range(3):
-                    point = sections[first + n, 0, j] + other[0] * sections[first + n, 1, j] + other[1] * sections[first + n, 2, j]
-                    ahead += across[j] * tilt[n] * point
+                    ahead += across[j] * tilt[n] * (of[0, j] + other[0] * of[1, j] + other[1] * of[2, j])
             if ahead < 0.0:
                 low, falls, gap_low = moved, ahead, found
             else:
@@ -204,7 +204,11 @@ def _write_place(
                 steep = (ahead - last_ahead) / (moved - last)
             last, last_ahead = moved, ahead
             moved -= ahead / steep
-            if not low < moved < high:
+            if moved >= high and rises == 0.0:  # the minimum may be at the end
+                moved = high
+            elif moved <= low and falls == 0.0:
+                moved = low
+            elif not low < moved < high:
                 moved = 0.5 * (low + high)
                 if falls < 0.0 < rises:  # where both tangents meet: at an edge across the robot that is the place
                     moved = min(max((gap_high - gap_low + falls * low - rises * high) / (falls - rises), low), high)
