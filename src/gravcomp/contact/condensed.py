@@ -179,12 +179,12 @@ def _rub(
             return False
         wanted = friction * force[m : m + c]
         before[:], change[:], last = change, wanted - limit, largest
-        largest = np.abs(change).max() / max(wanted.max(), 1e-300)
+        largest = float(np.abs(change).max()) / max(float(wanted.max()), 1e-300)
         if largest <= _AGREED:
             break
         if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between
             turned = before - change
-            part = min(max(part * (before @ turned) / max(turned @ turned, 1e-300), _LEAST_PART), 1.0)
+            part = min(max(part * float(before @ turned) / max(float(turned @ turned), 1e-300), _LEAST_PART), 1.0)
         limit = np.maximum(limit + part * change, 0.0)
     return largest <= _NEARLY
 
