@@ -88,3 +88,22 @@ def test_a_force_that_is_rounding_error_does_not_turn():
     turns, moves, stiffness = turning(places, np.array([1.0, 5e-324]))
     assert turns.tolist() == [0] and not len(moves)
     assert stiffness == pytest.approx([100.0])
+
+
+def test_a_robot_slides_to_an_equilibrium_near_by_where_none_is_found_with_friction(model, monkeypatch):
+    """A search from the straight robot found one half a millimetre off, to which the walls had to lift the robot."""
+    scene, gravity = mesh_lumen(49, model.robot), seeded_gravity(49)
+    simulator = Simulator(model, reduced=False, scene=scene)
+    solver = simulator.solver
+    assert simulator.solve(gravity).is_equilibrium
+    before, track, turned = simulator.displacements.copy(), solver.track, gravity + np.array([0.0, 0.02, 0.0])
+
+    def lost_while_it_rubs(*arguments, **options):
+        state = track(*arguments, **options)
+        state.converged &= not solver.contact.rubbing
+        return state
+
+    monkeypatch.setattr(solver, "track", lost_while_it_rubs)
+    state = solver.approach(gravity, turned, CableInput())
+    assert state.converged and solver.contact.rubbing
+    assert 0.0 < np.abs(state.u - before).max() < 1e-3

@@ -17,8 +17,8 @@ from gravcomp.full_model.wrench import Load, PointLoads
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.mesh.mesh import MeshError
 
-# Part of the load that is applied first, and that in which it is applied where an obstacle has friction.
-_PART, _RUBBING_PART = 0.25, 0.1
+# Part of the load that is applied first, of a change of load, and that in which either is applied where an obstacle has friction.
+_PART, _HALF, _RUBBING_PART = 0.25, 0.5, 0.1
 # Smallest part of a change of load that continues an equilibrium.
 _LEAST_PART = 1.0 / 16
 # Lengths of the robot by which it may sag linearly before its loads change in smaller steps.
@@ -91,12 +91,18 @@ class StaticSolver(StaticTracker):
         """Return the equilibrium that continues the current state, which balances the gravity `before` (3,), to a new load.
 
         The load changes in steps, which are halved where they fail, as in `solve`. This follows a large change in less time than
-        a search from the straight robot, and stays on the branch of equilibria.
+        a search from the straight robot, and stays on the branch of equilibria. Where none is found with friction, the robot
+        slides to one without: near by, and without a gain of energy.
         """
-        here = self.state
+        here, sliding = self.state, self.sliding
         origin = here.tendons.displacement + self.model.tendons.stretch(here.tendons) * here.tension
-        part, ends = _RUBBING_PART if self._rubs else 0.5, (np.asarray(before), np.asarray(gravity))
-        return self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, False)
+        part, ends = _RUBBING_PART if self._rubs else _HALF, (np.asarray(before), np.asarray(gravity))
+        state = self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, False)
+        if state.converged or self.contact is None or not self._rubs:
+            return state
+        self.sliding = sliding
+        with self.contact.without_friction():
+            return self._in_parts(ends, origin, cables, _HALF, _LEAST_PART, here, None, 6, False)
 
     def _in_parts(
         self,
