@@ -23,7 +23,8 @@ forces and friction together. Its states, at a bound or between, are changed all
 (J. Judice, F. Pires, 1994), and one at a time, the last wrong one, where that leaves as many wrong ones (K. Murty, 1974). Where
 that does not end, sweeps over the forces and Newton steps of those between their bounds, clipped and halved until they lower the
 sum, find them (J. More, G. Toraldo, SIAM J. Optim. 1, 1991, with sweeps for gradient steps). The limits follow from the normal
-forces found, in a few rounds (P. Panagiotopoulos, 1975). The number of solves is bounded.
+forces found, in a few rounds (P. Panagiotopoulos, 1975). Where two places take the force from one another in turns, a part of
+each change is taken (B. Irons, R. Tuck, 1969). The number of solves is bounded.
 
 Next to convex obstacles D is positive, and the robot may be balanced as on top of a ball. Where the forces that turn overcome
 the stiffness, they are left out: the steps then lead away from such a shape. It is no solution where it would be left.
@@ -41,7 +42,8 @@ _STEPS, _SWEEPS, _HALVES = 200, 3, 30  # steps that lower the sum, sweeps before
 _STIFF = 1e-2  # of the stiffness that forces which turn have to leave, to be part of a step
 _RUNAWAY = 2.0  # of the largest force: growth in a step along which the sum has no minimum
 _SMALL = 1e-12  # m of slack that is rounding error
-_ROUNDS, _AGREED, _NEARLY = 15, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
+_ROUNDS, _AGREED, _NEARLY = 30, 1e-6, 1e-2  # rounds of friction limits; their change, of the largest, that ends them or will do
+_SHRINKS, _LEAST_PART = 0.5, 0.05  # part of the last round's change to which the next one has to shrink; least part taken of one
 
 
 @njit(cache=True)
@@ -166,26 +168,25 @@ def _rub(
     force: np.ndarray,
 ) -> bool:  # fmt: skip
     """Find forces with friction; returns whether limits and normal forces agree. rub (c, 2): first guess of the friction."""
+    limit, change, before, part, largest = friction * force[m : m + c], np.zeros(c), np.zeros(c), 1.0, np.inf
     for i in range(c):
-        for v in range(2):
-            k = m + c + 2 * i + v
-            high[k], low[k] = friction[i] * force[m + i], -friction[i] * force[m + i]
-            force[k] = rub[i, v]
-    change = np.inf
-    for _ in range(_ROUNDS):
+        force[m + c + 2 * i : m + c + 2 * i + 2] = rub[i]
+    for turn in range(_ROUNDS):
+        for i in range(c):
+            for k in range(m + c + 2 * i, m + c + 2 * i + 2):
+                high[k], low[k] = limit[i], -limit[i]
         if not _bounded(w, q, low, high, force):
             return False
-        change, largest = 0.0, 1e-300
-        for i in range(c):
-            limit = friction[i] * force[m + i]
-            for v in range(2):
-                k = m + c + 2 * i + v
-                change, largest = max(change, abs(limit - high[k])), max(largest, limit)
-                high[k], low[k] = limit, -limit
-        change /= largest
-        if change <= _AGREED:
+        wanted = friction * force[m : m + c]
+        before[:], change[:], last = change, wanted - limit, largest
+        largest = float(np.abs(change).max()) / max(float(wanted.max()), 1e-300)
+        if largest <= _AGREED:
             break
-    return change <= _NEARLY
+        if turn and largest > _SHRINKS * last:  # they go to and fro: the limit lies between
+            turned = before - change
+            part = min(max(part * float(before @ turned) / max(float(turned @ turned), 1e-300), _LEAST_PART), 1.0)
+        limit = np.maximum(limit + part * change, 0.0)
+    return largest <= _NEARLY
 
 
 @njit(cache=True)

@@ -11,6 +11,8 @@ from gravcomp.contact.places import Places
 from gravcomp.contact.surface import ContactSurface
 from gravcomp.scene.distance import SceneArrays, gap_to
 
+_ROUNDING = 1e-15  # of the largest force
+
 
 class Pressed(NamedTuple):
     """The p places that are pressed.
@@ -150,8 +152,9 @@ def turning(places: Places, pressed: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """Return the places whose forces turn, those whose forces move, and their stiffness D (turns + moves,) in N/m.
 
     pressed (c,): normal forces in N. The rows are those of the tangents at the middles, then those of the tilts. A force of 0
-    does neither, nor does that of a plane turn.
+    does neither, nor does that of a plane turn; one that is rounding error is 0.
     """
+    pressed = np.where(pressed > _ROUNDING * max(pressed.max(), 0.0), pressed, 0.0) if len(pressed) else pressed
     stiffness, moving = pressed * places.curvature, pressed * places.rocking
     turns, moves = np.flatnonzero(stiffness), np.flatnonzero(moving)
     return turns, moves, np.concatenate((stiffness[turns], moving[moves]))

@@ -18,7 +18,7 @@ from gravcomp.contact.outline_gap import ball, deepest, deepest_from
 from gravcomp.contact.surface import ContactSurface, size_and_way
 from gravcomp.scene.distance import BOX, PLANE, SURFACE, SceneArrays, gap_to
 
-_MOVES, _THERE = 8, 1e-7  # corrections of the place along the robot, and the part of a distance of stations that ends them
+_MOVES, _THERE = 12, 1e-7  # corrections of the place along the robot, and the part of a distance of stations that ends them
 _ACROSS = 0.9  # cosine between the axis at the tip and a wall's normal, above which the tip's face can lie on it
 _WORTH = 3e-4  # of the radius: places move along the robot where that can make the gap smaller by this
 
@@ -179,6 +179,7 @@ def _write_place(
     if best <= before and best <= after and bend > 8.0 * _WORTH * surface.radius[s]:
         end = stations - 1.0
         low, high = max(place - 1.0, 0.0), min(place + 1.0, end)
+        falls, rises, gap_low, gap_high = 0.0, 0.0, 0.0, 0.0  # slopes and gaps at both of them, once they are known
         moved, other, across = place - slope / bend, np.empty(2), np.empty(3)
         last, last_ahead, steep = place, 0.0, bend
         for turn in range(_MOVES):
@@ -192,16 +193,29 @@ def _write_place(
             # The gap's slope along the robot follows from its gradient; its bend is at first that of the stations.
             ahead = 0.0
             for n in range(4):
+                of = sections[first + n]
                 for j in range(3):
-                    ahead += across[j] * tilt[n] * sections[first + n, 0, j]
+                    ahead += across[j] * tilt[n] * (of[0, j] + other[0] * of[1, j] + other[1] * of[2, j])
+            if ahead < 0.0:
+                low, falls, gap_low = moved, ahead, found
+            else:
+                high, rises, gap_high = moved, ahead, found
             if turn and (ahead - last_ahead) * (moved - last) > 0.0:
                 steep = (ahead - last_ahead) / (moved - last)
             last, last_ahead = moved, ahead
             moved -= ahead / steep
+            if moved >= high and rises == 0.0:  # the minimum may be at the end
+                moved = high
+            elif moved <= low and falls == 0.0:
+                moved = low
+            elif not low < moved < high:
+                moved = 0.5 * (low + high)
+                if falls < 0.0 < rises:  # where both tangents meet: at an edge across the robot that is the place
+                    moved = min(max((gap_high - gap_low + falls * low - rises * high) / (falls - rises), low), high)
             if abs(moved - last) < _THERE:
                 break
         if 0.0 < min(max(moved, low), high) < end:  # at an end of the robot the place stays when it tilts
-            result.rocking[i] = -1.0 / bend
+            result.rocking[i] = -1.0 / steep
     result.first[i] = between(place, stations, share, tilt)
     _section_at(sections, result.first[i], share, section)
     sharp = scene.kind[k] == BOX or scene.kind[k] == SURFACE

@@ -5,6 +5,8 @@ right-hand sides of the factor that the step has anyway, A X = C^T, next to thos
 dense: the compliance S of cables and places, from which forces and states follow (`contact.condensed`).
 """
 
+import contextlib
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -91,6 +93,15 @@ class FullContact:
         """Return the sections (s, 3, 3) p, f_1, f_2 of the stations at the displacements u (n, 3)."""
         return (self._rows @ (self._model.mesh.nodes + u)).reshape(-1, 3, 3)
 
+    @contextlib.contextmanager
+    def without_friction(self) -> Iterator[None]:
+        """Leave friction out meanwhile."""
+        rubbing, self.rubbing = self.rubbing, False
+        try:
+            yield
+        finally:
+            self.rubbing = rubbing
+
     @property
     def longest(self) -> float:
         """Largest step in m that cannot pass over an obstacle."""
@@ -176,7 +187,7 @@ class FullContact:
         tension = cables.tensions(compliance, free, state.tension > 0.0)
         sections = self.sections(state.u)
         moved = self._of_vectors[0] @ (foreseen + answer @ tension).reshape(-1, 3)
-        places = find_places(self.arrays, self.surface, sections, moved, self.margin + self.allowed, last.force)
+        places = find_places(self.arrays, self.surface, sections, moved, self.margin - self.allowed, last.force)
         own = None if self.own is None else self.own.rows(sections, moved, self.margin, last.own)
         if not len(places.row) and own is None:
             state.compliance, state.answer = compliance, answer

@@ -17,8 +17,8 @@ from gravcomp.full_model.wrench import Load, PointLoads
 from gravcomp.mechanics.block_matrix import NotPositiveDefinite
 from gravcomp.mesh.mesh import MeshError
 
-# Parts of the load in which it is applied where an obstacle has friction.
-_RUBBING_PART = 0.1
+# Part of the load that is applied first, of a change of load, and that in which either is applied where an obstacle has friction.
+_PART, _HALF, _RUBBING_PART = 0.25, 0.5, 0.1
 # Smallest part of a change of load that continues an equilibrium.
 _LEAST_PART = 1.0 / 16
 # Lengths of the robot by which it may sag linearly before its loads change in smaller steps.
@@ -37,17 +37,41 @@ class StaticSolver(StaticTracker):
         halved. If a step of 1 / parts of the load fails, or of the share of it that suits a soft robot (`share_of_steps`), the
         branch of equilibria ends there in a limit point, or nearly: the last equilibrium is returned with `load_fraction` below
         1 and `converged` False, and the solver keeps its state.
+
+        Obstacles that the straight robot is in are lowered by its depth, and rise to their place. Friction counts from where the
+        robot is out of them, from a tenth of the load on: rising walls are no motion of the robot. Where no equilibrium is found
+        on that way, one without friction is sought: it is one with friction too, in which nothing rubs.
         """
         start, loads = self.state, PointLoads.of(self.model, wrench)
         depth = self._depth(gravity)
         if not depth and not self._rubs and self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
             return self.state
         self.reset()
-        origin = self.state.tendons.displacement
-        part = _RUBBING_PART if self._rubs else 0.25  # friction depends on the way: the whole load at once is none
-        ends = np.zeros(3), np.asarray(gravity)
+        ends, origin = (np.zeros(3), np.asarray(gravity)), self.state.tendons.displacement
         least = self.share_of_steps(gravity, loads) / parts
-        return self._in_parts(ends, origin, cables, part, least, start, loads, 15, exact=True, depth=depth)
+
+        def loaded(first: float, last: float, part: float, depth: float) -> Equilibrium:
+            finest = (last - first) * least
+            return self._in_parts(ends, origin, cables, part, finest, start, loads, 15, True, depth, (first, last))
+
+        if self.contact is None or not self._rubs:
+            return loaded(0.0, 1.0, _PART, depth)
+        done = 0.0
+        if depth:
+            with self.contact.without_friction():
+                done, state = _RUBBING_PART, loaded(0.0, _RUBBING_PART, _PART * _RUBBING_PART, depth)
+        if not depth or state.converged:
+            state = loaded(done, 1.0, _RUBBING_PART, 0.0)
+        if state.converged:
+            return state
+        self.reset()
+        with self.contact.without_friction():
+            here = loaded(0.0, 1.0, _PART, depth)
+        if not here.converged:
+            return state
+        if not self.track(gravity, cables, iterations=15, exact=True, loads=loads).converged:
+            self.state = here
+        return self.state
 
     def share_of_steps(self, gravity: np.ndarray, loads: PointLoads | None = None) -> float:
         """Return by how much smaller the steps of a load have to be than those of a robot that sags by three lengths at most.
@@ -67,12 +91,18 @@ class StaticSolver(StaticTracker):
         """Return the equilibrium that continues the current state, which balances the gravity `before` (3,), to a new load.
 
         The load changes in steps, which are halved where they fail, as in `solve`. This follows a large change in less time than
-        a search from the straight robot, and stays on the branch of equilibria.
+        a search from the straight robot, and stays on the branch of equilibria. Where none is found with friction, the robot
+        slides to one without: near by, and without a gain of energy.
         """
-        here = self.state
+        here, sliding = self.state, self.sliding
         origin = here.tendons.displacement + self.model.tendons.stretch(here.tendons) * here.tension
-        part, ends = _RUBBING_PART if self._rubs else 0.5, (np.asarray(before), np.asarray(gravity))
-        return self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, exact=False, depth=0.0)
+        part, ends = _RUBBING_PART if self._rubs else _HALF, (np.asarray(before), np.asarray(gravity))
+        state = self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, False)
+        if state.converged or self.contact is None or not self._rubs:
+            return state
+        self.sliding = sliding
+        with self.contact.without_friction():
+            return self._in_parts(ends, origin, cables, _HALF, _LEAST_PART, here, None, 6, False)
 
     def _in_parts(
         self,
@@ -84,22 +114,23 @@ class StaticSolver(StaticTracker):
         kept: Equilibrium,
         loads: PointLoads | None,
         iterations: int,
-        *,
         exact: bool,
-        depth: float,
+        depth: float = 0.0,
+        span: tuple[float, float] = (0.0, 1.0),
     ) -> Equilibrium:
         """Change gravity from one of its `ends` (3,) to the other, and the cables' displacements from `origin` (m,), in steps.
 
         part: the first step's share of the load; a step that fails is halved, down to `least`. Then the last equilibrium is
         returned, not converged, with the fraction of the load that it balances, and the solver keeps the state `kept`.
-        iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first.
+        iterations, exact: of `track`. depth: m by which the robot is in an obstacle at first. span: fractions of the load that
+        the current state balances, and up to which it changes; the obstacles are at their place there.
         """
-        (before, gravity), here, sliding, done = ends, self.state, self.sliding, 0.0
-        while done < 1.0:
-            fraction = min(1.0, done + part)
+        (before, gravity), here, sliding, (done, whole) = ends, self.state, self.sliding, span
+        while done < whole:
+            fraction = min(whole, done + part)
             force = before + fraction * (gravity - before)
             if self.contact is not None:
-                self.contact.allowed = (1.0 - fraction) * depth
+                self.contact.allowed = (1.0 - fraction / whole) * depth
             state = self.track(force, cables.part(origin, fraction), iterations, exact=exact, loads=loads, fraction=fraction)
             if state.converged:
                 here, sliding, done, part = self.state, self.sliding, fraction, part if self._rubs else 2.0 * part
