@@ -442,6 +442,21 @@ def test_twice_the_error_is_enough_at_every_number_of_points_that_the_board_has_
     assert count(fewest - 1, fewest) == (fewest, rough) and count(0, fewest - 1) == (most, within)
 
 
+def test_half_of_the_error_is_left_where_few_points_do_so():
+    columns = np.random.default_rng(4).random((30, 60))
+    total = columns @ np.ones(60)
+    allowed = 0.02 * np.linalg.norm(total)
+
+    def count(few: int) -> tuple[int, float]:
+        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, (999, 999), few)
+        return len(index), left
+
+    (fewest, rough), (most, within) = count(0), count(999)
+    assert fewest < most and within <= 0.5 * allowed < rough <= allowed
+    # Beyond the few the whole error may be left.
+    assert count(fewest) == (fewest, rough) and count(most) == (most, within)
+
+
 def test_a_reduced_hyperelastic_body_with_cable_friction_follows_the_full_one(robot, cache):
     cables = tuple(dataclasses.replace(cable, friction=1.0) for cable in robot.cables)
     model, reduction = built_once(dataclasses.replace(robot, cables=cables).with_material(law="yeoh"))

@@ -77,12 +77,13 @@ def choose(
     sections: np.ndarray,
     tolerance: float,
     enough: tuple[int, int],
+    few: int = 0,
 ) -> Cubature:
     """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
 
     compliance (s, r, r): K_s^-1; sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length;
     tolerance: largest `error` of the result; enough: smallest and largest number of points that are enough where they leave at
-    most twice as much.
+    most twice as much; few: up to so many points, half as much is to be left.
     """
     weighing = _weighing(compliance, sections)
     element, point = (index.ravel() for index in np.indices(elements.weights.shape))
@@ -98,7 +99,8 @@ def choose(
         columns.append(forces[:, is_candidate[part]])
     forces = np.hstack(columns)
     root = np.sqrt(len(coordinates))
-    chosen, found, left = sparse_weights(forces.T @ forces, forces.T @ total, float(total @ total), tolerance * root, enough)
+    products = forces.T @ forces, forces.T @ total, float(total @ total)
+    chosen, found, left = sparse_weights(*products, tolerance * root, enough, few)
     at = candidates[chosen]
     return Cubature(element[at], point[at], found, left / root)
 
@@ -115,18 +117,19 @@ def _weighing(compliance: np.ndarray, sections: np.ndarray) -> np.ndarray:
 
 
 def sparse_weights(
-    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, enough: tuple[int, int]
+    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, enough: tuple[int, int], few: int = 0
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Return indices (p,), positive weights (p,) and remaining |A w - b| of few columns of A for which it is at most `allowed`.
 
     gram A^T A (c, c); products A^T b (c,); square b^T b; enough: smallest and largest number of columns that are enough where
-    they leave at most twice as much.
+    they leave at most twice as much; few: up to so many columns, half as much is to be left.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     active = _ActiveSet(gram / np.outer(scale, scale), products / scale)
     left = np.sqrt(square)
     for _ in range(3 * len(products)):
-        if left <= max(allowed, 1e-7 * np.sqrt(square)):
+        wanted = allowed if active.count >= few else 0.5 * allowed
+        if left <= max(wanted, 1e-7 * np.sqrt(square)):
             break
         if enough[0] <= active.count <= enough[1] and left <= 2.0 * allowed:
             break

@@ -21,7 +21,7 @@ from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 16
+_FORMAT = 17
 
 
 @dataclass(frozen=True)
