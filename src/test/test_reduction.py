@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from coarse_article import SMALL, built_once, cache_of_the_run, coarse
+from scipy.spatial.transform import Rotation
 
 from gravcomp.bench.contact_scenes import scene_of
 from gravcomp.description import Cable, Elements, Fibres, Material, PronyTerm, Robot, Segment
@@ -406,6 +407,16 @@ def test_forces_that_are_in_error_where_a_shape_is_stiff_move_nothing(modes):
         choose(model.elements, basis, coordinates, compliance, sections, 3e-5, (999, 999)) for compliance in (soft, stiff)
     )
     assert len(of_stiff.weight) < 0.8 * len(of_soft.weight) and of_stiff.error <= 3e-5
+
+
+def test_points_are_chosen_where_a_body_is_so_stiff_that_its_part_is_rounding_error(modes):
+    """As those of a rod of metal between soft disks."""
+    model, _, _ = with_law(modes, "neo_hookean")
+    _, _, basis, _ = modes
+    coordinates, turn = 0.1 * np.random.default_rng(2).normal(size=(40, 3)), Rotation.random(40, rng=5).as_matrix()
+    compliance = turn @ np.diag([1.0, 1e-20, 1e-20]) @ turn.swapaxes(1, 2)
+    chosen = choose(model.elements, basis, coordinates, compliance, section_changes(model, basis)[:, 0], 1e-3, (999, 999))
+    assert len(chosen.weight) and chosen.error <= 1e-3
 
 
 def test_the_compliance_of_a_sample_is_that_of_the_full_model(built):

@@ -106,13 +106,17 @@ def choose(
 
 
 def _weighing(compliance: np.ndarray, sections: np.ndarray) -> np.ndarray:
-    """Return W (s, r, r) for the compliances (s, r, r) and the change of the sections (n, 3, r)."""
+    """Return W (s, r, r) for the compliances (s, r, r) and the change of the sections (n, 3, r).
+
+    By QR from the roots of both parts: next to a soft body, what a stiff one adds to W^T W is less than its rounding error.
+    """
     weighing = np.empty_like(compliance)
     for to, of in zip(weighing, compliance):
-        moved = sections.reshape(-1, len(of)) @ of
-        metric = moved.T @ moved / len(sections)
-        metric += _OTHERS**2 * np.trace(metric) / np.trace(of) * of
-        to[:] = np.linalg.cholesky(metric).T
+        moved = sections.reshape(-1, len(of)) @ of / np.sqrt(len(sections))
+        square, direction = np.linalg.eigh(of)
+        root = np.sqrt(np.maximum(square, 0.0))[:, None] * direction.T
+        others = _OTHERS * np.linalg.norm(moved) / np.linalg.norm(root)
+        to[:] = np.linalg.qr(np.vstack([moved, others * root]), mode="r")
     return weighing
 
 
