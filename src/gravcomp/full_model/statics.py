@@ -52,7 +52,8 @@ class StaticSolver(StaticTracker):
 
         def loaded(first: float, last: float, part: float, depth: float) -> Equilibrium:
             finest = (last - first) * least
-            return self._in_parts(ends, origin, cables, part, finest, start, loads, 15, True, depth, (first, last))
+            span = first, last
+            return self._in_parts(ends, origin, cables, part, finest, start, loads, 15, exact=True, depth=depth, span=span)
 
         if self.contact is None or not self._rubs:
             return loaded(0.0, 1.0, _PART, depth)
@@ -97,12 +98,12 @@ class StaticSolver(StaticTracker):
         here, sliding = self.state, self.sliding
         origin = here.tendons.displacement + self.model.tendons.stretch(here.tendons) * here.tension
         part, ends = _RUBBING_PART if self._rubs else _HALF, (np.asarray(before), np.asarray(gravity))
-        state = self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, False)
+        state = self._in_parts(ends, origin, cables, part, _LEAST_PART, here, None, 6, exact=False)
         if state.converged or self.contact is None or not self._rubs:
             return state
         self.sliding = sliding
         with self.contact.without_friction():
-            return self._in_parts(ends, origin, cables, _HALF, _LEAST_PART, here, None, 6, False)
+            return self._in_parts(ends, origin, cables, _HALF, _LEAST_PART, here, None, 6, exact=False)
 
     def _in_parts(
         self,
@@ -114,6 +115,7 @@ class StaticSolver(StaticTracker):
         kept: Equilibrium,
         loads: PointLoads | None,
         iterations: int,
+        *,
         exact: bool,
         depth: float = 0.0,
         span: tuple[float, float] = (0.0, 1.0),
