@@ -164,11 +164,12 @@ def test_the_reduced_cables_stretch_like_the_full_models():
     tendons, field = model.tendons, np.zeros((len(model.mesh.nodes), 3))
     field[:, 0] = (model.mesh.nodes[:, 2] / model.length) ** 2
     straight, bent = (tendons.state(model.mesh.nodes + a * field) for a in (0.0, 0.02))
-    pieces = [state.tangent * state.length[:, None] for state in (straight, bent)]
+    pieces = [np.ascontiguousarray((state.tangent * state.length[:, None]).T) for state in (straight, bent)]
     cables = ReducedCables(
         rest=pieces[0],
-        change=((pieces[1] - pieces[0]) / 0.02).reshape(-1, 1),
+        change=((pieces[1] - pieces[0]) / 0.02)[None],
         cable=tendons._cable,
+        first=np.searchsorted(tendons._cable, np.arange(7)),
         rest_length=tendons.rest_length,
         axial_compliance=tendons.axial_compliance,
         friction=tendons.friction.coefficient,

@@ -1,6 +1,7 @@
 """What touches: places, gaps and forces of one equilibrium, and the obstacles with what presses on each of them."""
 
 import dataclasses
+import functools
 
 import numpy as np
 
@@ -19,6 +20,7 @@ class ObstacleForces:
     change: np.ndarray
 
     @staticmethod
+    @functools.cache
     def none() -> "ObstacleForces":
         """Return no obstacle."""
         return ObstacleForces((), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 0)))
@@ -69,6 +71,7 @@ class Contacts:
     against: np.ndarray = dataclasses.field(default_factory=lambda: np.zeros(0))
 
     @staticmethod
+    @functools.cache
     def none() -> "Contacts":
         """Return no contact."""
         whole, points = np.zeros(0, dtype=np.int64), np.zeros((0, 3))

@@ -1,6 +1,5 @@
 """A reduced model as the blob that the board reads in place from flash (gravcomp_hw/firmware/standalone/model.h)."""
 
-import dataclasses
 import struct
 import zlib
 from collections.abc import Sequence
@@ -14,7 +13,6 @@ from gravcomp.full_model.viscosity import branch
 from gravcomp.materials.laws import LAWS
 from gravcomp.reduction.law_deviation import LawDeviation
 from gravcomp.reduction.reduced_model import ReducedModel
-from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 MAGIC, VERSION = b"GCMB", 3
 TILE = 4
@@ -28,28 +26,6 @@ _IDENTITY = 1e-5  # largest difference of the linear strains from the coordinate
 def robot_digest(robot: Robot) -> bytes:
     """Return 16 bytes that say which robot a blob belongs to: its description, whatever the basis of the reduced model."""
     return bytes.fromhex(content_key(robot))
-
-
-def truncated(model: ReducedModel, modes: int, extra: int) -> ReducedModel:
-    """Return the model on its first modes, a multiple of four, with the strains of these and the first `extra` principal ones."""
-    r, m = model.elasticity.linear.shape
-    strains = np.r_[0:modes, r : min(m, r + extra)]
-    pairs = modes * (modes + 1) // 2
-    elasticity = StrainPolynomials(
-        np.ascontiguousarray(model.elasticity.linear[:modes, strains]),
-        np.ascontiguousarray(model.elasticity.quadratic[:pairs, strains]),
-    )
-    return dataclasses.replace(
-        model,
-        basis=model.basis[:, :modes],
-        coordinates_of=model.coordinates_of[:modes],
-        force_norm=np.ascontiguousarray(model.force_norm[:modes, :modes]),
-        elasticity=elasticity,
-        deviation=model.deviation._replace(gradient=np.ascontiguousarray(model.deviation.gradient[:modes])),
-        weight=model.weight[:modes],
-        cables=model.cables._replace(change=np.ascontiguousarray(model.cables.change[:, :modes])),
-        section_change=np.ascontiguousarray(model.section_change[..., :modes]),
-    )
 
 
 def pack(
@@ -73,11 +49,11 @@ def pack(
     tables = (
         _by_tiles(np.pad(quadratic, ((0, 0), (0, missing))), modes),
         _cable_stiffness(model)[:, _tile_order(modes)].T,
-        cables.change,
+        cables.change.transpose(2, 1, 0),
         model.weight.T,
         model.section_change[-1].reshape(9, modes),
         model.section_rest[-1],
-        cables.rest,
+        cables.rest.T,
         model.section_change[:-1, 0],
         model.section_rest[:-1, 0],
         cables.rest_length,
@@ -146,7 +122,7 @@ def _branch_table(branches: Sequence[tuple[float, float]]) -> np.ndarray:
 def _cable_stiffness(model: ReducedModel) -> np.ndarray:
     """Return the stiffness (m, r (r + 1) / 2) of each cable under unit tension at rest, without the part along its pieces."""
     cables, modes = model.cables, model.size
-    change = cables.change.reshape(-1, 3, modes) / np.sqrt(np.linalg.norm(cables.rest, axis=1))[:, None, None]
+    change = (cables.change / np.sqrt(np.linalg.norm(cables.rest, axis=0))).transpose(2, 1, 0)
     whole = np.zeros((len(cables.rest_length), modes, modes))
     for i in range(len(whole)):
         rows = change[cables.cable == i].reshape(-1, modes)

@@ -20,8 +20,7 @@ from gravcomp.firmware.model_blob import (
     VERSION,
     blob_bytes,
     pack,
-    truncated,
-)  # fmt: skip
+)
 from gravcomp.firmware.model_settings import BRANCHES_MAX, SAMPLE_PERIOD, LoopParameters, least_tensions, settings
 from gravcomp.firmware.standalone_loop import StandaloneLoop
 from gravcomp.full_model.cable_input import CableInput
@@ -171,7 +170,7 @@ def _candidates(whole: ReducedModel) -> Iterator[tuple[ReducedModel, int]]:
     points = len(whole.deviation.weight)
     for modes in range(min(whole.size, MODES_MAX) // TILE * TILE, 0, -TILE):
         for extra in _EXTRA:
-            smaller = truncated(whole, modes, extra)
+            smaller = whole.of_first(modes, extra)
             share = min(points, _affordable(smaller))
             if fits(smaller) and (share >= _LEAST_SHARE or not points):
                 yield smaller, share
@@ -247,7 +246,7 @@ def _error(smaller: ReducedModel, model: RobotModel, run: HostRun) -> float:
 
 def _too_big(whole: ReducedModel, parameters: LoopParameters) -> str:
     """Return why not even the smallest basis fits."""
-    smallest = truncated(whole, TILE, 0)
+    smallest = whole.of_first(TILE, 0)
     return (
         f"{parameters.source}: no basis fits: {TILE} modes take {_bytes(smallest) / 1024:.0f} of {SLOT_BYTES // 1024} KB"
         f" and {cost(smallest)[1]:.1f} of {LONGEST_MS:g} ms"

@@ -128,18 +128,19 @@ class InverseController:
         if previous is None:
             previous = response.compliance_aa @ tension + response.displacement_free
         last = previous
-        if self._rigging.coupled.any():
+        if self._rigging.has_coupled:
             # A slack antagonist is far longer than its path and follows its motor: its path is free, whatever the winch reaches.
             path = response.compliance_aa @ tension + response.displacement_free
             previous = np.where(self._rigging.coupled, np.maximum(previous, path), previous)
         interval = min(max(interval, 0.0), self._longest_interval(response))
-        move = self._retreat.move(followed, target, _tip(response, tension), tension)
+        tip = _tip(response, tension)
+        move = self._retreat.move(followed, target, tip, tension)
         if followed:
             interval *= self._retreat.stride
         if move != Move.ONWARD:
             return self._recovery_command(move, followed, response, target, previous, tension, interval, started)
         forces = ObstacleForces.none() if contact is None else contact
-        release = self._release_from(target, forces, tension, _tip(response, tension), gravity)
+        release = self._release_from(target, forces, tension, tip, gravity)
         demands = self._surroundings.demands(response, tension, backbone_station, gravity, forces, options.max_contact_force)
         try:
             programme = build_programme(

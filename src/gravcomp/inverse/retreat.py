@@ -68,7 +68,7 @@ class Retreat:
         """
         if not _same(target, self._target):
             self._target, self._tries, self._lost_times, self._still, self._until = target, 0, 0, 0, None
-        if followed and tension.max() <= _LITTLE_TENSION * self._tension_max:
+        if followed and max(tension.tolist()) <= _LITTLE_TENSION * self._tension_max:
             self._tip_at_rest = tip
         if not followed:
             self._lost += 1
@@ -94,7 +94,8 @@ class Retreat:
 
         held: what is around the robot keeps it where it is; another path does not lead past it.
         """
-        self._still = self._still + 1 if not held and np.abs(change).max() <= self._slow * interval else 0
+        at_rest = all(abs(winch) <= self._slow * interval for winch in change.tolist())
+        self._still = self._still + 1 if at_rest and not held else 0
 
     def _try_again(self, tip: np.ndarray, tension: np.ndarray) -> None:
         """Start paying the cables out if another attempt from there may get nearer to the target."""

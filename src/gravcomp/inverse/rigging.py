@@ -14,8 +14,8 @@ from gravcomp.inverse.scaling import NO_BOUND, UNCOUPLED, Couplings
 class Rigging:
     """Cables and motors of one robot.
 
-    Attributes: couplings, of the paths by shared motors; coupled (m,): the cables that have such a motor; shared: whether the
-    motors make other displacements than those that are asked of them.
+    Attributes: couplings, of the paths by shared motors; coupled (m,): the cables that have such a motor; has_coupled: whether
+    there are any; shared: whether the motors make other displacements than those that are asked of them.
     """
 
     def __init__(self, robot: Robot, transmission: Transmission | None):
@@ -26,6 +26,7 @@ class Rigging:
         self.couplings = UNCOUPLED if self._transmission is None else _couplings(self._transmission)
         rows = self.couplings.rows
         self.coupled = rows.any(axis=0) if len(rows) else np.zeros(len(robot.cables), bool)
+        self.has_coupled = bool(self.coupled.any())
         self._least: tuple[float, np.ndarray] | None = None  # a pretension, and the bounds that follow from it
 
     def possible(self, displacement: np.ndarray, tension: np.ndarray) -> np.ndarray:

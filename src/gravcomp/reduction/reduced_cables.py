@@ -11,14 +11,16 @@ from gravcomp.rounding import REORDERED
 class ReducedCables(NamedTuple):
     """The cables of a reduced model.
 
-    rest (s, 3): e_k(0) in m; change (3 s, r): D_k; cable (s,): cable of each straight piece; rest_length (m,) of the paths in m;
-    axial_compliance (m,) from capstan to end in m/N, without friction; friction (m,) coefficient; sheath_angle (m,) in rad and
-    free_length (m,) in m between capstan and robot.
+    rest (3, s): e_k(0) in m; change (r, 3, s): D_k in single precision, the s straight pieces last, cable after cable, so that a
+    step reads memory in order; cable (s,): cable of each piece; first (m + 1,): first piece of each cable, and s at the end;
+    rest_length (m,) of the paths in m; axial_compliance (m,) from capstan to end in m/N, without friction; friction (m,)
+    coefficient; sheath_angle (m,) in rad and free_length (m,) in m between capstan and robot.
     """
 
     rest: np.ndarray
     change: np.ndarray
     cable: np.ndarray
+    first: np.ndarray
     rest_length: np.ndarray
     axial_compliance: np.ndarray
     friction: np.ndarray
@@ -29,7 +31,7 @@ class ReducedCables(NamedTuple):
 class ReducedTendons(NamedTuple):
     """The cables at coordinates q.
 
-    tangent (s, 3), length (s,) and share (s,) of the pieces: tension over that at the capstan; mean_share (m,): its mean along
+    tangent (3, s), length (s,) and share (s,) of the pieces: tension over that at the capstan; mean_share (m,): its mean along
     each cable; displacement (m,) of the paths in m; jacobian (m, r): its derivative by q; force_jacobian (m, r): its transpose
     times the tensions is the cables' force.
     """
@@ -46,55 +48,72 @@ class ReducedTendons(NamedTuple):
 @njit(cache=True, fastmath=REORDERED)
 def tendons_at(cables: ReducedCables, q: np.ndarray, pulling: np.ndarray) -> ReducedTendons:
     """Return the cables at q (r,). pulling (m,): 1 for a cable that is pulled in, -1 for one paid out, 0 for no friction."""
-    count, r = len(cables.cable), len(q)
-    tangent, length = np.empty((count, 3)), np.empty(count)
-    displacement, jacobian = cables.rest_length.copy(), np.zeros((len(cables.rest_length), r))
+    r, _, count = cables.change.shape
+    tangent, change = cables.rest.copy(), cables.change.reshape(r, 3 * count)
+    along, i = tangent.reshape(3 * count), 0
+    while i + 4 <= r:  # four rows at a time: the sums are read and written less often
+        d_0, d_1, d_2, d_3 = change[i], change[i + 1], change[i + 2], change[i + 3]
+        q_0, q_1, q_2, q_3 = q[i], q[i + 1], q[i + 2], q[i + 3]
+        for k in range(3 * count):
+            along[k] += q_0 * d_0[k] + q_1 * d_1[k] + q_2 * d_2[k] + q_3 * d_3[k]
+        i += 4
+    while i < r:
+        d_0, q_0 = change[i], q[i]
+        for k in range(3 * count):
+            along[k] += q_0 * d_0[k]
+        i += 1
+    length, displacement = np.empty(count), cables.rest_length.copy()
     for k in range(count):
-        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
-        x, y, z = cables.rest[k, 0], cables.rest[k, 1], cables.rest[k, 2]
-        for a in range(r):
-            x += of_x[a] * q[a]
-            y += of_y[a] * q[a]
-            z += of_z[a] * q[a]
-        length[k] = np.sqrt(x * x + y * y + z * z)
+        length[k] = np.sqrt(tangent[0, k] ** 2 + tangent[1, k] ** 2 + tangent[2, k] ** 2)
         displacement[cables.cable[k]] -= length[k]
-        x, y, z = x / length[k], y / length[k], z / length[k]
-        tangent[k, 0], tangent[k, 1], tangent[k, 2] = x, y, z
-        row = jacobian[cables.cable[k]]
-        for a in range(r):
-            row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
+        for a in range(3):
+            tangent[a, k] /= length[k]
+    jacobian = _shortening(cables, tangent)
     share, mean_share, force_jacobian = np.ones(count), np.ones(len(pulling)), jacobian
     for i in range(len(pulling)):
         if cables.friction[i] * pulling[i] != 0.0:
-            force_jacobian = _with_friction(cables, tangent, cables.friction * pulling, share, r)
+            _capstan(cables, tangent, cables.friction * pulling, share)
             _mean_shares(cables, length, cables.friction * pulling, share, mean_share)
+            force_jacobian = _shortening(cables, share * tangent)
             break
     return ReducedTendons(tangent, length, share, mean_share, displacement, jacobian, force_jacobian)
 
 
 @njit(cache=True, fastmath=REORDERED)
-def _with_friction(cables: ReducedCables, tangent: np.ndarray, friction: np.ndarray, share: np.ndarray, r: int) -> np.ndarray:
-    """Write the share (s,) of capstan friction, as `cables.friction` does, and return the force Jacobian (m, r).
+def _shortening(cables: ReducedCables, direction: np.ndarray) -> np.ndarray:
+    """Return by how much (m, r) each cable's pieces become shorter along their directions (3, s), for unit changes of q."""
+    r, _, count = cables.change.shape
+    shorter, part, first = np.empty((len(cables.rest_length), r)), np.empty(count), cables.first
+    u_0, u_1, u_2 = direction[0], direction[1], direction[2]
+    for i in range(r):
+        d_0, d_1, d_2 = cables.change[i, 0], cables.change[i, 1], cables.change[i, 2]
+        for k in range(count):
+            part[k] = u_0[k] * d_0[k] + u_1[k] * d_1[k] + u_2[k] * d_2[k]
+        for c in range(len(shorter)):
+            value = 0.0
+            for x in part[first[c] : first[c + 1]]:
+                value -= x
+            shorter[c, i] = value
+    return shorter
+
+
+@njit(cache=True)
+def _capstan(cables: ReducedCables, tangent: np.ndarray, friction: np.ndarray, share: np.ndarray) -> None:
+    """Write the share (s,) of capstan friction, as `cables.friction` does, for the tangents (3, s).
 
     friction (m,): coefficient with the sign of the sliding direction.
     """
-    jacobian = np.zeros((len(friction), r))
     turned = 0.0
     for k in range(len(cables.cable)):
         i = cables.cable[k]
-        x, y, z = tangent[k]
         if k > 0 and cables.cable[k - 1] == i:
-            before = tangent[k - 1]
-            turned += np.arccos(max(-1.0, min(1.0, x * before[0] + y * before[1] + z * before[2])))
+            cosine = 0.0
+            for a in range(3):
+                cosine += tangent[a, k] * tangent[a, k - 1]
+            turned += np.arccos(max(-1.0, min(1.0, cosine)))
         else:
             turned = cables.sheath_angle[i]
         share[k] = np.exp(-friction[i] * turned)
-        x, y, z = share[k] * x, share[k] * y, share[k] * z
-        row = jacobian[i]
-        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
-        for a in range(r):
-            row[a] -= x * of_x[a] + y * of_y[a] + z * of_z[a]
-    return jacobian
 
 
 @njit(cache=True)
@@ -123,34 +142,57 @@ def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.nd
     """Add the geometric stiffness of cables under the tensions (m,) to the lower triangle of matrix (r, r).
 
     The stiffness of a piece is tension / length D^T (I - t t^T) D, where I - t t^T = a a^T + b b^T with two unit vectors across
-    t. So the sum over all pieces is R^T R with the rows sqrt(tension / length) a^T D and sqrt(tension / length) b^T D.
+    t. So the sum over all pieces is R^T R with the rows sqrt(tension / length) a^T D and sqrt(tension / length) b^T D. It is a
+    small part of the stiffness, for which single precision is enough.
     """
-    r = len(matrix)
-    rows, used = np.empty((2 * len(cables.cable) + 3, r)), 0
+    r, _, count = cables.change.shape
+    across = _across(cables, tendons, tension)
+    parts = np.empty((r, 2, count), dtype=np.float32)
+    for i in range(r):
+        d_0, d_1, d_2 = cables.change[i, 0], cables.change[i, 1], cables.change[i, 2]
+        for v in range(2):
+            to, u_0, u_1, u_2 = parts[i, v], across[3 * v], across[3 * v + 1], across[3 * v + 2]
+            for k in range(count):
+                to[k] = u_0[k] * d_0[k] + u_1[k] * d_1[k] + u_2[k] * d_2[k]
+    rows = parts.reshape(r, 2 * count)
+    for i in range(r):
+        row, line, j = rows[i], matrix[i], 0
+        while j + 4 <= i + 1:  # four entries at a time: the row is read less often
+            r_0, r_1, r_2, r_3 = rows[j], rows[j + 1], rows[j + 2], rows[j + 3]
+            k_0 = k_1 = k_2 = k_3 = np.float32(0.0)
+            for k in range(2 * count):
+                x = row[k]
+                k_0 += x * r_0[k]
+                k_1 += x * r_1[k]
+                k_2 += x * r_2[k]
+                k_3 += x * r_3[k]
+            line[j] += k_0
+            line[j + 1] += k_1
+            line[j + 2] += k_2
+            line[j + 3] += k_3
+            j += 4
+        while j <= i:
+            r_0, k_0 = rows[j], np.float32(0.0)
+            for k in range(2 * count):
+                k_0 += row[k] * r_0[k]
+            line[j] += k_0
+            j += 1
+
+
+@njit(cache=True, fastmath=REORDERED)
+def _across(cables: ReducedCables, tendons: ReducedTendons, tension: np.ndarray) -> np.ndarray:
+    """Return a and b (6, s) across each piece, times the root of tension over length, in single precision."""
+    across = np.empty((6, len(cables.cable)), dtype=np.float32)
     for k in range(len(cables.cable)):
         root = np.sqrt(tendons.share[k] * tension[cables.cable[k]] / tendons.length[k])
-        if root == 0.0:
-            continue
-        x, y, z = tendons.tangent[k]
+        x, y, z = tendons.tangent[0, k], tendons.tangent[1, k], tendons.tangent[2, k]
         # Duff et al., Building an orthonormal basis, revisited (JCGT 2017).
         sign = 1.0 if z >= 0.0 else -1.0
         p = -1.0 / (sign + z)
         s = x * y * p
-        a_x, a_y, a_z = root * (1.0 + sign * x * x * p), root * sign * s, -root * sign * x
-        b_x, b_y, b_z = root * s, root * (sign + y * y * p), -root * y
-        of_x, of_y, of_z = cables.change[3 * k], cables.change[3 * k + 1], cables.change[3 * k + 2]
-        to_a, to_b = rows[used], rows[used + 1]
-        for i in range(r):
-            to_a[i] = a_x * of_x[i] + a_y * of_y[i] + a_z * of_z[i]
-            to_b[i] = b_x * of_x[i] + b_y * of_y[i] + b_z * of_z[i]
-        used += 2
-    rows[used : used + 3] = 0.0
-    for k in range(0, used, 4):
-        r_0, r_1, r_2, r_3 = rows[k], rows[k + 1], rows[k + 2], rows[k + 3]
-        for i in range(r):
-            to, f_0, f_1, f_2, f_3 = matrix[i], r_0[i], r_1[i], r_2[i], r_3[i]
-            for j in range(i + 1):
-                to[j] += f_0 * r_0[j] + f_1 * r_1[j] + f_2 * r_2[j] + f_3 * r_3[j]
+        across[0, k], across[1, k], across[2, k] = root * (1.0 + sign * x * x * p), root * sign * s, -root * sign * x
+        across[3, k], across[4, k], across[5, k] = root * s, root * (sign + y * y * p), -root * y
+    return across
 
 
 @njit(cache=True)

@@ -5,6 +5,7 @@ weight, the straight pieces of the cables and the cross-sections are linear in t
 e_k(0) + D_k q, sections(q) = sections(0) + S q.
 """
 
+import dataclasses
 import math
 from dataclasses import dataclass
 
@@ -48,6 +49,20 @@ class ReducedModel:
     def size(self) -> int:
         """Number r of coordinates."""
         return self.basis.shape[1]
+
+    def of_first(self, modes: int, extra: int) -> "ReducedModel":
+        """Return the model on its first modes, with the strains of these and the first `extra` principal ones."""
+        return dataclasses.replace(
+            self,
+            basis=self.basis[:, :modes],
+            coordinates_of=self.coordinates_of[:modes],
+            force_norm=np.ascontiguousarray(self.force_norm[:modes, :modes]),
+            elasticity=self.elasticity.of_first(modes, extra),
+            deviation=self.deviation._replace(gradient=np.ascontiguousarray(self.deviation.gradient[:modes])),
+            weight=self.weight[:modes],
+            cables=self.cables._replace(change=self.cables.change[:modes]),
+            section_change=np.ascontiguousarray(self.section_change[..., :modes]),
+        )
 
     def observe(self, q: np.ndarray, answer: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return the sections (n + 1, 3, 3) at q (r,), as in `Effectors.sections`, and `observation.observe` of them.
@@ -110,7 +125,8 @@ def project(
     model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
     weighted = matrix.multiply(basis)
     pieces = [(cable, *piece) for cable, route in enumerate(route_cables(model.robot, model.mesh)) for piece in pieces_of(route)]
-    change = np.array([np.einsum("n,ani->ia", w, modes[:, nodes]) for _, nodes, w in pieces]).reshape(-1, r)
+    change = np.array([np.einsum("n,ani->ai", w, modes[:, nodes]) for _, nodes, w in pieces]).reshape(-1, r, 3)
+    cable = np.array([cable for cable, _, _ in pieces], dtype=np.int64)
     coordinates_of = np.linalg.solve(basis.T @ weighted, weighted.T)
     return ReducedModel(
         basis=basis,
@@ -120,9 +136,10 @@ def project(
         deviation=cubature.deviation(model.elements, basis),
         weight=np.einsum("anj,n->aj", modes, model.nodal_weight),
         cables=ReducedCables(
-            rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3),
-            change=np.ascontiguousarray(change),
-            cable=np.array([cable for cable, _, _ in pieces], dtype=np.int64),
+            rest=np.array([weights @ model.mesh.nodes[nodes] for _, nodes, weights in pieces]).reshape(-1, 3).T.copy(),
+            change=np.ascontiguousarray(change.transpose(1, 2, 0), dtype=np.float32),
+            cable=cable,
+            first=np.searchsorted(cable, np.arange(model.tendons.count + 1)),
             rest_length=model.tendons.rest_length,
             axial_compliance=model.tendons.axial_compliance,
             friction=model.tendons.friction.coefficient,

@@ -248,7 +248,7 @@ class ReducedServing:
         return bool(
             moved @ moved > (_MOVED * self.reduced.reach) ** 2
             or turned @ turned > _TURNED**2 * (gravity @ gravity)
-            or np.abs(state.displacement - displacement).max(initial=0.0) > _WOUND * self._model.length
+            or any(abs(wound) > _WOUND * self._model.length for wound in (state.displacement - displacement).tolist())
         )
 
     def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> float:

@@ -21,7 +21,7 @@ from gravcomp.reduction.reduced_model import ReducedModel, project
 from gravcomp.reduction.strain_polynomials import StrainPolynomials
 
 # Part of the key; increase it when the stored content or the training changes.
-_FORMAT = 17
+_FORMAT = 18
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,11 @@ class Reduction:
     samples: int
     error_median: float
     error_worst: float
+
+    def of_first(self, modes: int, extra: int) -> "Reduction":
+        """Return the reduction on its first modes, with the strains of these and the first `extra` principal ones."""
+        basis = np.ascontiguousarray(self.basis[:, :modes])
+        return dataclasses.replace(self, basis=basis, elasticity=self.elasticity.of_first(modes, extra))
 
     def reduced_model(self, model: RobotModel) -> ReducedModel:
         """Return the reduced model; the model's modulus may differ from `modulus`."""

@@ -43,6 +43,14 @@ class StrainPolynomials:
     linear: np.ndarray
     quadratic: np.ndarray
 
+    def of_first(self, modes: int, extra: int) -> "StrainPolynomials":
+        """Return those on the first modes, with the strains of these and the first `extra` principal ones."""
+        r, m = self.linear.shape
+        strains, pairs = np.r_[0:modes, r : min(m, r + extra)], modes * (modes + 1) // 2
+        return StrainPolynomials(
+            np.ascontiguousarray(self.linear[:modes, strains]), np.ascontiguousarray(self.quadratic[:pairs, strains])
+        )
+
 
 @njit(cache=True)
 def _packed(i: int, j: int) -> int:

@@ -266,7 +266,7 @@ def _vector(name: str, value: np.ndarray, length: int, allow_nan: bool = False) 
     vector = np.asarray(value, dtype=float)
     if vector.shape != (length,):
         raise ValueError(f"{name} has the shape {vector.shape}; ({length},) is needed")
-    finite = math.isfinite(vector.sum())  # usually makes the slower checks unnecessary
+    finite = math.isfinite(vector @ vector)  # usually makes the slower checks unnecessary
     if not finite and (np.isinf(vector).any() or (not allow_nan and np.isnan(vector).any())):
         raise ValueError(f"{name} is {vector}; finite numbers are needed")
     return vector

@@ -10,34 +10,26 @@ from pathlib import Path
 
 import numpy as np
 
-from gravcomp.cables.friction import Sliding
 from gravcomp.cache import content_key
-from gravcomp.full_model.cable_input import CableInput
-from gravcomp.full_model.payload import with_payload
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.full_model.statics import StaticSolver
-from gravcomp.full_model.symmetry import symmetries
-from gravcomp.full_model.wrench import PointLoads
 from gravcomp.materials.laws import LAWS
 from gravcomp.mesh import MeshError
-from gravcomp.reduction.basis import energy_basis
 from gravcomp.reduction.cubature import Cubature, choose
-from gravcomp.reduction.reduced_loads import ReducedLoads
 from gravcomp.reduction.reduced_model import section_changes
 from gravcomp.reduction.serving import ReducedServing
 from gravcomp.reduction.store import Reduction, first_modulus, path_of, save, why_not
 from gravcomp.reduction.strain_polynomials import strain_polynomials
-from gravcomp.reduction.tracking import ReducedTracker
 from gravcomp.training.compliance import compliances
 from gravcomp.training.images import with_images
-from gravcomp.training.samples import Sample, TrainingOptions, samples, wrench_of
-from gravcomp.training.trained_shapes import TrainedShapes, evenly
+from gravcomp.training.modes import Modes
+from gravcomp.training.samples import TrainingOptions, samples
+from gravcomp.training.smallest import smallest
+from gravcomp.training.tip_errors import tip_errors
+from gravcomp.training.trained_shapes import evenly
 
 # The model may be used up to the trained |q| times this factor; its error is measured in any case.
 _MARGIN = 1.3
-# The share of new shapes that the modes have to represent, without the few near the end of the equilibria. And the share of the
-# trained shapes.
-_MOST_NEW, _MOST_TRAINED = 0.95, 0.98
 
 
 @dataclass(frozen=True)
@@ -84,7 +76,8 @@ def build(
     kept = path_of(model).with_suffix(".training") / content_key(options.training)
     reduction = trained(model, options, progress, kept)
     unseen = samples(model, options.test, lambda share: progress("testing", share))
-    errors = tip_errors(model, reduction, unseen)
+    errors = tip_errors(model, reduction.reduced_model(model), unseen)
+    errors = errors[np.isfinite(errors)]
     if not errors.size:
         raise MeshError("the reduced model finds none of the test's equilibria: the full model is used")
     reduction = replace(reduction, error_median=float(np.median(errors)), error_worst=float(errors.max()))
@@ -108,57 +101,23 @@ def trained(
     reason = why_not(model)
     if reason:
         raise MeshError(reason)
-    modes = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
+    few = options.modes + (options.loaded_modes if model.robot.max_wrench else 0)
     exact = all(LAWS[material.law].quadratic for material in model.mesh.materials)
-    most_modes = modes + options.more_modes
-    matrix = model.new_matrix()
-    model.elements.assemble(np.zeros_like(model.mesh.nodes), matrix)
-    maps = symmetries(model)
-
-    def missed(basis: np.ndarray, some: TrainedShapes) -> np.ndarray:
-        """Return what the modes (n, r) miss of each shape (s,): at the section where it is most, over the length."""
-        apart: np.ndarray = np.linalg.norm(section_changes(model, some.missing(basis).T)[:, 0], axis=1).max(axis=0) / model.length
-        return apart
-
-    def represent(basis: np.ndarray, some: TrainedShapes, most: float) -> bool:
-        """Return whether the modes (n, r) represent the share `most` of the shapes."""
-        return bool(np.quantile(missed(basis, some), most) <= options.represented)
-
-    def basis_of(some: TrainedShapes) -> np.ndarray:
-        """Return as many modes (n, r) of the shapes as the robot may have, the most important ones first.
-
-        Of modes for the energy and modes to which each shape counts alike: those that miss less of the shapes (mean square).
-        """
-        shown = some.part(evenly(len(some.rows), options.decomposed))
-        gram = shown.gram()
-        both = [energy_basis(shown.rows, matrix.multiply, most_modes, alike, gram) for alike in (False, True)]
-        return min(both, key=lambda basis: float(np.mean(missed(basis, some) ** 2)))
-
-    def enough(earlier: list[Sample], new: list[Sample]) -> bool:
-        """Return whether the modes of the earlier samples represent the new ones, or not even those of all: more do not help."""
-        earlier = with_images(earlier, maps)
-        if len(earlier) < most_modes or not new:
-            return False
-        every = TrainedShapes.of(earlier + with_images(new, maps), matrix)
-        before, unseen = every.part(slice(len(earlier))), every.part(slice(len(earlier), None, 1 + len(maps)))
-        return represent(basis_of(before), unseen, _MOST_NEW) or not represent(basis_of(every), unseen, _MOST_NEW)
-
-    turns = 1 + sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in maps)
-    computed = samples(model, options.training, lambda share: progress("training", share), kept, enough, turns=turns)
-    found = with_images(computed, maps)
-    if len(found) < modes:
+    modes = Modes(model, few, few + options.more_modes, options.represented, options.decomposed)
+    turns = 1 + sum(np.linalg.det(symmetry.matrix) > 0.0 for symmetry in modes.maps)
+    computed = samples(model, options.training, lambda share: progress("training", share), kept, modes.enough, turns=turns)
+    found = with_images(computed, modes.maps)
+    if len(found) < few:
         raise MeshError(
-            f"only {len(found)} equilibria were found for the training, at least {modes} are needed;"
+            f"only {len(found)} equilibria were found for the training, at least {few} are needed;"
             " the robot may be too soft for its weight"
         )
     progress("decomposing", 0.0)
-    shapes = TrainedShapes.of(found, matrix)
-    basis = basis_of(shapes)
-    if represent(basis[:, :modes], shapes, _MOST_TRAINED):
-        basis = np.ascontiguousarray(basis[:, :modes])
+    shapes = modes.shapes(found)
+    basis = modes.basis_of(shapes)
     progress("integrating", 0.0)
     shown = shapes.rows[evenly(len(found), options.decomposed)]
-    strains = options.strains + (0 if exact or basis.shape[1] == modes else options.more_strains)
+    strains = options.strains + (0 if exact or basis.shape[1] == few else options.more_strains)
     elasticity = strain_polynomials(model.elements, basis, shown[evenly(len(shown), options.strained)], strains)
     low, high = options.training.modulus_range
     modulus = first_modulus(model)
@@ -169,9 +128,10 @@ def trained(
         some = evenly(len(found), options.integrated)
         compliance = compliances(model, basis, [found[number] for number in some])
         room = options.points, options.board_points
-        few = options.few_points
-        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, room, few)
-    return Reduction(
+        cubature = choose(
+            model.elements, basis, coordinates[some], compliance, sections, options.cubature, room, options.few_points
+        )
+    whole = Reduction(
         basis=basis,
         elasticity=elasticity,
         cubature=cubature,
@@ -183,6 +143,7 @@ def trained(
         error_median=np.nan,
         error_worst=np.nan,
     )
+    return smallest(model, whole, computed, few, options.represented, lambda share: progress("choosing its size", share))
 
 
 @contextlib.contextmanager
@@ -195,29 +156,3 @@ def alone(model: RobotModel, waiting: Callable[[], None] = lambda: None) -> Iter
             waiting()
             fcntl.flock(lock, fcntl.LOCK_EX)
         yield
-
-
-def tip_errors(model: RobotModel, reduction: Reduction, unseen: list[Sample]) -> np.ndarray:
-    """Return the tip errors (k,) of the reduced model in m, for the samples at which it converges.
-
-    At the others the full model would be used.
-    """
-    reduced = reduction.reduced_model(model)
-    tracker = ReducedTracker(reduced, model.length)
-    projected = ReducedLoads(model, reduced.basis)
-    u = np.zeros_like(model.mesh.nodes)
-    errors = []
-    for sample in unseen:
-        tracker.place(
-            reduced.coordinates_of @ sample.unknowns,
-            sample.tension,
-            Sliding(sample.pulling, np.full_like(sample.pulling, np.nan)),
-        )
-        loads = with_payload(model, sample.gravity, PointLoads.of(model, wrench_of(sample.load)))
-        force = None if loads is None else projected.at(loads, tracker.state.q)
-        state = tracker.track(sample.gravity, CableInput(tension=sample.tension), iterations=10, force=force)
-        if state.converged:
-            model.free(u)[:] = sample.unknowns
-            tip = model.effectors.sections(model.mesh.nodes + u)[-1, 0]
-            errors.append(np.linalg.norm(reduced.tip(state.q) - tip))
-    return np.array(errors)
