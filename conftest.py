@@ -14,7 +14,9 @@ those that take longest first. With fewer than four processors the tests with th
 of the commands in test/ without a mark starts no graph that goes on.
 """
 
+import contextlib
 import fcntl
+import importlib
 import os
 import sys
 import tempfile
@@ -47,6 +49,7 @@ FIRST = (
     "test_colcon_workspace",
     "test_record_replay",
     "test_targets",
+    "test_board_client",
     "test_contact",
     "test_reduction",
     "test_calibrate_command",
@@ -54,6 +57,8 @@ FIRST = (
     "test_statics",
     "test_inverse_recovery",
     "test_bridge",
+    "test_bridge_driver",
+    "test_late_reduction",
     "test_inverse",
 )
 _OF_A_TERMINAL = ("COLUMNS", "LINES", "FORCE_COLOR", "TTY_COMPATIBLE", "TTY_INTERACTIVE")  # they wrap and colour output
@@ -79,31 +84,49 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.pop(name, None)
 
 
-@pytest.hookimpl(wrapper=True, tryfirst=True)
-def pytest_collection(session: pytest.Session):
-    """Collect first in one process where modules have to be rewritten, which takes twice as long as the rest.
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection(session: pytest.Session) -> None:
+    """Import the test modules, each process in another order, where some of them have to be rewritten.
 
-    pytest rewrites the assertions of each test module that has changed, and keeps the result; in a new clone all processes would
-    do it at the same time.
+    pytest rewrites the assertions of each test module that has changed, which takes twice as long as the rest of a collection,
+    and keeps the result. In a new clone all processes would rewrite the same modules at the same time. So each begins with other
+    modules, and finds later those that the others have rewritten.
     """
-    # Without pytest-xdist the file is that of another run, whose graphs hold it.
-    if not hasattr(session.config, "workerinput") or sys.dont_write_bytecode or not _to_rewrite(session.config):
-        return (yield)
-    with open(os.environ[_LOCK], "rb") as first:
-        fcntl.flock(first, fcntl.LOCK_EX)
-        if _to_rewrite(session.config):
-            return (yield)
-    return (yield)
+    config = session.config
+    if not hasattr(config, "workerinput") or sys.dont_write_bytecode:
+        return
+    modules = _modules(config)
+    if all(_is_rewritten(module) for module in modules):
+        return
+    number, count = int(config.workerinput["workerid"].removeprefix("gw")), config.workerinput["workercount"]
+    for module in _from_own_share(modules, number, count):
+        _import(module)
 
 
-def _to_rewrite(config: pytest.Config) -> bool:
-    """Return whether there are modules in the folders of this run that pytest has not rewritten as they are."""
+def _modules(config: pytest.Config) -> list[Path]:
+    """Return the test modules in the folders of this run."""
+    return [path for folder in config.args for path in sorted((config.invocation_params.dir / folder).glob("test_*.py"))]
+
+
+def _from_own_share(modules: list[Path], number: int, count: int) -> list[Path]:
+    """Return the modules from the first of the share of process `number` of `count`, to the last one before it."""
+    first = number * len(modules) // count
+    return modules[first:] + modules[:first]
+
+
+def _is_rewritten(module: Path) -> bool:
+    """Return whether pytest has rewritten a module as it is."""
     kind = f"{sys.implementation.cache_tag}-pytest-{pytest.__version__}.pyc"
-    for module in (path for folder in config.args for path in (config.invocation_params.dir / folder).glob("test_*.py")):
-        rewritten = Path(cache_from_source(str(module))).with_name(f"{module.stem}.{kind}")
-        if not rewritten.exists() or rewritten.stat().st_mtime < module.stat().st_mtime:
-            return True
-    return False
+    rewritten = Path(cache_from_source(str(module))).with_name(f"{module.stem}.{kind}")
+    return rewritten.exists() and rewritten.stat().st_mtime >= module.stat().st_mtime
+
+
+def _import(module: Path) -> None:
+    """Import a test module as the collection does, which finds it then; one that cannot be imported is reported there."""
+    if str(module.parent) not in sys.path:
+        sys.path.insert(0, str(module.parent))
+    with contextlib.suppress(Exception, pytest.skip.Exception):
+        importlib.import_module(module.stem)
 
 
 @pytest.fixture(autouse=True)

@@ -101,13 +101,14 @@ class ArcRobot:
         jacobian = cable_jacobian()
         answer = np.linalg.solve(_derivatives(self.q, gravity)[1], jacobian.T)
         shifts = 1e-6 * np.eye(6)
-        sensitivity = (effector(self.q + shifts) - effector(self.q - shifts)).T / 2e-6
+        there, ahead, behind = np.split(effector(self.q + np.concatenate([np.zeros((1, 6)), shifts, -shifts])), (1, 7))
+        sensitivity = (ahead - behind).T / 2e-6
         compliance_aa, compliance_ea = jacobian @ answer, sensitivity @ answer
         return SimpleNamespace(
             compliance_aa=compliance_aa,
             compliance_ea=compliance_ea,
             displacement_free=jacobian @ self.q - compliance_aa @ self.tension,
-            effector_free=effector(self.q) - compliance_ea @ self.tension,
+            effector_free=there[0] - compliance_ea @ self.tension,
         )
 
 

@@ -1,17 +1,23 @@
 """The arm: forward kinematics of its URDF, gravity in the robot's base, the tour, the shipped macro."""
 
+import argparse
+import contextlib
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from gravcomp.arm import description
 from gravcomp.arm.chain import Chain, angle_between
 from gravcomp.arm.description import expanded
 from gravcomp.arm.shape_chain import joint_names, joint_positions
 from gravcomp.arm.tour import FIVE_POSES, Tour
+from gravcomp.commands import arm as arm_command
+from gravcomp.commands import preparation
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file
+from gravcomp.launcher import host_client
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 
 URDF = Path(__file__).resolve().parents[2] / "gravcomp_fem" / "urdf"
@@ -171,3 +177,23 @@ def test_a_broken_xacro_is_named(tmp_path):
     )
     with pytest.raises(ConfigError, match=r"bad\.xacro"):
         expanded(bad)
+
+
+def test_the_command_expands_an_own_arm_once(monkeypatch):
+    class Reached(Exception):
+        pass
+
+    def reached(urdf):
+        raise Reached(urdf.read_text(encoding="utf-8"))
+
+    paths = []
+    monkeypatch.setattr(description, "expanded", lambda path: paths.append(path) or expanded(path))
+    monkeypatch.setattr(host_client, "NodeHost", contextlib.nullcontext)
+    monkeypatch.setattr(preparation, "prepare", lambda *_, **__: None)
+    monkeypatch.setattr(arm_command, "_start_of_tour", reached)
+    parser = argparse.ArgumentParser()
+    arm_command.add_arguments(parser)
+    own = URDF / "seven_axis_arm.urdf.xacro"
+    with pytest.raises(Reached) as found:
+        arm_command.run(parser.parse_args(["--xacro", str(own)]))
+    assert str(found.value) == expanded(own) and paths == [own]

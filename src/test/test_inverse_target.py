@@ -57,3 +57,13 @@ def test_points_far_out_of_reach_are_refused(arguments, said):
 def test_points_without_weight_or_slightly_out_of_reach_are_allowed():
     Target([0, 0, 9.0], tip_position_weight=0.0, tip_direction=[0, 0, 1], tip_direction_weight=1.0).check_reach(0.1)
     Target([0, 0, 0.12]).check_reach(0.1)
+
+
+def test_a_target_with_its_tip_elsewhere_is_otherwise_the_same():
+    target = bend_target(0.1, 1.2, 0.7, tip_direction_weight=1e-3, backbone_station=[0.5], backbone_weight=[1.0])
+    moved = target.with_tip_at(np.array([0.01, 0.02, 0.03]))
+    assert moved.tip_position.tolist() == [0.01, 0.02, 0.03] and target.tip_position.tolist() != [0.01, 0.02, 0.03]
+    for name in ("tip_direction", "backbone_station", "backbone_position", "backbone_weight"):
+        assert getattr(moved, name) is getattr(target, name)
+    with pytest.raises(TargetError, match="finite"):
+        target.with_tip_at(np.array([0.0, np.inf, 0.1]))

@@ -7,7 +7,7 @@ import pytest
 from mesh_bodies import TAPERED_TUBE
 
 from gravcomp.description import Cap, Elements, Material, MeshBody, Robot, Segment, load_robot_file
-from gravcomp.mesh import MeshError, body_mesh, tube_mesh
+from gravcomp.mesh import MeshError, body_mesh, section_division, tube_mesh
 from gravcomp.mesh.elements import KINDS, jacobians, reference_nodes, shape_gradients, shape_values
 from gravcomp.mesh.embedding import embed
 from gravcomp.mesh.quality import mesh_quality
@@ -68,6 +68,17 @@ def test_the_sections_of_a_mesh_that_is_made_again_are_the_same_and_those_of_ano
     assert section_functionals(tube_mesh(robot), heights[::-1])[:3] == pytest.approx(kept[6:], abs=0.0)
     finer = tube_mesh(dataclasses.replace(robot, elements=Elements(around=8, along=10)))
     assert section_functionals(finer, heights).shape == (9, len(finer.nodes))
+
+
+def test_meshes_that_differ_along_the_robot_have_one_division_of_the_section(monkeypatch):
+    robot = load_robot_file("article").robot
+    pieces, length = robot.pieces, robot.length
+    one = section_division.divided_sections(pieces, 6, 1)
+    monkeypatch.setattr(section_division, "section_grid", None)  # a call fails
+    monkeypatch.setattr(section_division, "lumen_grid", None)
+    assert section_division.divided_sections(pieces, 6, 1) is one
+    meshes = [tube_mesh(robot, around=6, along=along, radial=1) for along in (12, 14)]
+    assert [mesh.length for mesh in meshes] == [length, length] and len(meshes[0].nodes) < len(meshes[1].nodes)
 
 
 def test_too_few_layers_are_named():

@@ -1,15 +1,21 @@
 """Bags of earlier ROS 2 releases are read as those of today: complete, without metadata.yaml, cut off, with foreign types."""
 
+import dataclasses
+import struct
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from older_bags import RELEASES, Topic, write_mcap, write_sqlite
+from rosbags.interfaces import MessageDefinition, MessageDefinitionFormat
 from rosbags.typesys import Stores, get_typestore
 from test_bags import IMU, imu
 
 from gravcomp.commands.__main__ import main
+from gravcomp.recordings.bags import decoding
 from gravcomp.recordings.bags.recovery import readable
 from gravcomp.recordings.bags.streams import VECTOR, Wanted, read_streams
-from gravcomp.recordings.imu import read_recording
+from gravcomp.recordings.imu import RecordingError, read_recording
 
 COUNT = 150
 WRITERS = {"sqlite": write_sqlite, "mcap": write_mcap}
@@ -72,6 +78,36 @@ def test_a_bag_that_was_cut_off_is_read_up_to_there(tmp_path, topics, release, s
     file.write_bytes(file.read_bytes()[: int(0.7 * file.stat().st_size)])
     recording = read_recording(path)
     assert 0.5 * COUNT < len(recording) < COUNT and "damaged" in recording.notes[0]
+
+
+def test_a_definition_that_cannot_be_read_matters_only_to_its_own_topic(tmp_path, topics):
+    damaged = Topic(FOREIGN.name, FOREIGN.kind, FOREIGN.messages, "float64 [[\n")
+    check(write_mcap(tmp_path / "bag", RELEASES["iron"], [*topics, damaged]))
+    wrong = dataclasses.replace(topics[0], definition=topics[0].definition.replace("float64 x", "float32 x"))
+    with pytest.raises(RecordingError, match="the definition of sensor_msgs/msg/Imu has the hash"):
+        read_recording(write_mcap(tmp_path / "wrong", RELEASES["iron"], [wrong]))
+
+
+def test_definitions_are_read_once_for_all_bags(tmp_path, topics, monkeypatch):
+    path = write_mcap(tmp_path / "bag", RELEASES["iron"], topics)
+    check(path)
+    read = []
+    monkeypatch.setattr(decoding, "get_types_from_msg", lambda *definition: read.append(definition))
+    check(path)
+    check(write_sqlite(tmp_path / "other", RELEASES["iron"], topics))
+    assert not read
+
+
+@pytest.mark.parametrize("named", [False, True])
+def test_messages_with_definitions_in_idl_are_decoded(named):
+    line = 80 * "=" + "\nIDL: "
+    point = "module a_msgs {\nmodule msg {\nstruct Point {\ndouble x;\n};\n};\n};\n"
+    pair = "module a_msgs {\nmodule msg {\nstruct Pair {\na_msgs::msg::Point one;\ndouble other;\n};\n};\n};\n"
+    text = f"{line}a_msgs/msg/Pair\n{pair}{line}a_msgs/msg/Point\n{point}" if named else point
+    kind = "a_msgs/msg/Pair" if named else "a_msgs/msg/Point"
+    connection = SimpleNamespace(msgtype=kind, msgdef=MessageDefinition(MessageDefinitionFormat.IDL, text), digest="")
+    message = decoding.decoded(connection, b"\x00\x01\x00\x00" + struct.pack("<2d", 1.5, 2.5)[: 16 if named else 8])
+    assert (message.one.x, message.other) == (1.5, 2.5) if named else message.x == 1.5
 
 
 def test_the_commands_read_a_bag_of_an_earlier_release(tmp_path, topics, capsys):

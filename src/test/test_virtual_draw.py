@@ -7,6 +7,7 @@ import yaml
 from gravcomp.closed_loop.setup import Setup
 from gravcomp.config import ConfigError
 from gravcomp.description import load_robot_file, shipped_robots
+from gravcomp.description import robot as robot_module
 from gravcomp.virtual.described import described
 
 ROBOT = {
@@ -38,6 +39,11 @@ def stranger(tmp_path):
         return load_robot_file(path)
 
     return make
+
+
+def cables_of(count):
+    first = ROBOT["cables"][0]
+    return [first | {"name": f"c{i}", "angle_deg": 360 / count * i} for i in range(count)]
 
 
 def moduli(true):
@@ -109,6 +115,17 @@ def test_the_shipped_article_gives_all_values_that_decide_its_motion():
     assert not true.drawn
     assert moduli(true) == pytest.approx(0.75e6)
     assert [c.radius for c in true.robot.cables] == pytest.approx([3.18e-3] * 6)
+
+
+def test_the_drawn_places_of_all_cables_are_checked_together(stranger, monkeypatch):
+    of_three, of_nine = (stranger(f"of_{count}", robot=ROBOT | {"cables": cables_of(count)}) for count in (3, 9))
+    checked = []
+    check = robot_module.check_crossings
+    monkeypatch.setattr(robot_module, "check_crossings", lambda *arguments: checked.append(1) or check(*arguments))
+    described(of_three, 3).draw()
+    fewer = len(checked)
+    described(of_nine, 3).draw()
+    assert fewer > 0 and len(checked) == 2 * fewer
 
 
 def test_cables_at_the_wall_are_drawn_inside_the_body(stranger):

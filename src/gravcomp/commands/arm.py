@@ -63,24 +63,25 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Run the tour. Returns 0: completed. Raises ConfigError, LaunchError, NodeDied, TimeoutError."""
-    if args.xacro:
-        _check_arm(Path(args.xacro))  # before the host, which would import for nothing
+    given = _checked_arm(Path(args.xacro)) if args.xacro else None  # before the host, which would import for nothing
     # Before the imports of the command: the host imports for the nodes at the same time.
     from gravcomp.launcher.host_client import NodeHost
 
     with NodeHost() as host:
-        return _run(args, host)
+        return _run(args, given, host)
 
 
-def _check_arm(xacro: Path) -> None:
-    """Raise ConfigError for an arm that cannot be read, or does not carry the robot."""
+def _checked_arm(xacro: Path) -> str:
+    """Return the URDF of an arm. Raises ConfigError for one that cannot be read, or does not carry the robot."""
     from gravcomp.arm.chain import Chain
     from gravcomp.arm.description import expanded
 
-    Chain(expanded(xacro), "soft_base", "world", str(xacro))
+    described = expanded(xacro)
+    Chain(described, "soft_base", "world", str(xacro))
+    return described
 
 
-def _run(args: argparse.Namespace, host: "NodeHost") -> int:
+def _run(args: argparse.Namespace, given: str | None, host: "NodeHost") -> int:
     from gravcomp.arm.description import expanded, shipped_xacro
     from gravcomp.commands.preparation import prepare
     from gravcomp.launcher import Graph
@@ -89,10 +90,10 @@ def _run(args: argparse.Namespace, host: "NodeHost") -> int:
 
     given_logs = made_logs(args.logs)
     builder = prepare(args.robot, virtual=True)
-    xacro = Path(args.xacro) if args.xacro else shipped_xacro("seven_axis_arm.urdf.xacro")
+    described = given or expanded(shipped_xacro("seven_axis_arm.urdf.xacro"))
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as scratch:
         urdf, result = Path(scratch) / "arm.urdf", Path(scratch) / "result.json"
-        urdf.write_text(expanded(xacro), encoding="utf-8")
+        urdf.write_text(described, encoding="utf-8")
         # Lower rates of ground truth and feedback than on hardware, to save CPU time for the loop.
         motion = {"motion": "topic", "truth_rate": 25.0, "feedback_rate": 125, **_start_of_tour(urdf)}
         graph = RobotGraph(args.robot, "udp_multicast", private_channels(args.robot), args.namespace, {"virtual_robot": motion})

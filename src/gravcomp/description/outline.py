@@ -1,6 +1,7 @@
 """Outline of a cross-section or of a lumen: an ellipse (a circle among them) or a rectangle."""
 
 import dataclasses
+import functools
 import math
 from typing import Protocol
 
@@ -124,6 +125,7 @@ class Outline:
         return text if self.x == 0.0 == self.y else f"{text} at ({self.x * 1e3:g}, {self.y * 1e3:g}) mm"
 
 
+@functools.lru_cache(maxsize=256)  # robots of a fit, or with other materials, have the outlines of the first
 def encloses(outer: HasGauge, inner: Outline, gap: float) -> bool:
     """Return whether `inner` lies inside `outer` with at least `gap` (m) between them."""
     for x, y in inner.boundary(np.linspace(0.0, 2 * math.pi, 48, endpoint=False)):

@@ -8,6 +8,7 @@ plane at phi, has at the arc length s = station * L
     p(s) = (rho cos(phi), rho sin(phi), z),   rho = L/theta (1 - cos(theta s/L)),   z = L/theta sin(theta s/L).
 """
 
+import copy
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -79,6 +80,15 @@ class Target:
                 raise TargetError(
                     f"{name} is {distance:.3g} m from the base; allowed for a robot of {length:g} m: up to {REACH * length:g} m"
                 )
+
+    def with_tip_at(self, position: np.ndarray) -> "Target":
+        """Return this target with its tip at `position` (3,) in m; what stays has been checked.
+
+        Raises TargetError for a position that is not finite.
+        """
+        moved = copy.copy(self)
+        object.__setattr__(moved, "tip_position", _finite(position, (3,), "tip_position"))
+        return moved
 
     @property
     def direction_or_zeros(self) -> np.ndarray:

@@ -11,11 +11,12 @@ storage here, above all for several right-hand sides.
 """
 
 import dataclasses
+import itertools
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 from numba import njit
-from scipy.linalg.blas import dsymm, dsyrk, dtrsm, dtrsv
+from scipy.linalg.blas import dgemm, dgemv, dsymm, dsyrk, dtrsm, dtrsv
 from scipy.linalg.lapack import dpotrf
 
 if TYPE_CHECKING:
@@ -191,35 +192,46 @@ class BlockCholesky:
     """The factor of a BlockMatrix. It uses the matrix's storage, so it is void as soon as the matrix is filled again."""
 
     def __init__(self, pattern: BlockPattern, diagonal: list[np.ndarray], coupling: list[np.ndarray]):
-        self._pattern = pattern
+        self._start = pattern.start.tolist()
         self._diagonal = diagonal
         self._coupling = coupling
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Return A^-1 b for b (n,) or (n, k)."""
         b = np.asarray(b, dtype=float)
-        columns = b.reshape(len(b), -1)
-        start = self._pattern.start
+        if b.size == len(b):  # a single right-hand side in half the time
+            return self._solve_one(b.ravel()).reshape(b.shape)
+        if not b.size:  # LAPACK takes no empty arrays
+            return b.copy()
         parts: list[np.ndarray] = []
         for i, block in enumerate(self._diagonal):
-            part = np.array(columns[start[i] : start[i + 1]], order="F")
+            part = np.array(b[self._start[i] : self._start[i + 1]], order="F")
             if i:
                 below = self._coupling[i - 1]
-                part -= below @ parts[-1][-below.shape[1] :]
-            parts.append(_solve_lower(block, part))
+                part = dgemm(-1.0, below, parts[-1][-below.shape[1] :], 1.0, part, overwrite_c=1)
+            parts.append(dtrsm(1.0, block, part, lower=1, overwrite_b=1))
         for i in range(len(parts) - 1, -1, -1):
             if i < len(self._coupling):
                 below = self._coupling[i]
-                parts[i][-below.shape[1] :] -= below.T @ parts[i + 1]
-            parts[i] = _solve_lower(self._diagonal[i], parts[i], transposed=1)
-        return np.concatenate(parts).reshape(b.shape)
+                parts[i][-below.shape[1] :] -= dgemm(1.0, below, parts[i + 1], trans_a=1)
+            parts[i] = dtrsm(1.0, self._diagonal[i], parts[i], lower=1, trans_a=1, overwrite_b=1)
+        return np.concatenate(parts)
 
-
-def _solve_lower(block: np.ndarray, right: np.ndarray, transposed: int = 0) -> np.ndarray:
-    """Solve with the lower triangle (n, n), or its transpose, for right-hand sides (n, k), which are overwritten."""
-    if right.shape[1] == 1:  # in half the time
-        return dtrsv(block, right[:, 0], lower=1, trans=transposed, overwrite_x=1)[:, None]
-    return dtrsm(1.0, block, right, lower=1, trans_a=transposed, overwrite_b=1)
+    def _solve_one(self, b: np.ndarray) -> np.ndarray:
+        """Return A^-1 b for b (n,)."""
+        x = np.array(b)
+        parts = [x[low:high] for low, high in itertools.pairwise(self._start)]  # each is solved in place
+        for i, block in enumerate(self._diagonal):
+            if i:
+                below = self._coupling[i - 1]
+                dgemv(-1.0, below, parts[i - 1][-below.shape[1] :], 1.0, parts[i], overwrite_y=1)
+            dtrsv(block, parts[i], lower=1, overwrite_x=1)
+        for i in range(len(parts) - 1, -1, -1):
+            if i < len(self._coupling):
+                below = self._coupling[i]
+                dgemv(-1.0, below, parts[i + 1], 1.0, parts[i][-below.shape[1] :], trans=1, overwrite_y=1)
+            dtrsv(self._diagonal[i], parts[i], lower=1, trans=1, overwrite_x=1)
+        return x
 
 
 def order_in_levels(cliques: list[np.ndarray], n_nodes: int, clamped: np.ndarray) -> tuple[np.ndarray, BlockPattern]:

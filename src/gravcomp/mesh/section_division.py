@@ -1,5 +1,6 @@
 """Division of the cross-sections of a row of pieces into quadrilaterals."""
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -14,9 +15,16 @@ from gravcomp.mesh.section_grid import SectionGrid, section_grid
 def divided_sections(pieces: Sequence[Piece], around: int, radial: int, equal_stiffness: bool = False) -> SectionGrid:
     """Divide the sections: `around` cells about the axis, or each lumen where there are several, and `radial` through walls.
 
-    equal_stiffness: see `section_grid`; without effect on sections with several lumens. Raises MeshError where the sections
-    of neighbours cannot share their nodes.
+    equal_stiffness: see `section_grid`; without effect on sections with several lumens. The arrays of the result are those of
+    other meshes of the same sections, and not to be changed. Raises MeshError where the sections of neighbours cannot share
+    their nodes.
     """
+    return _divided(tuple(pieces), around, radial, equal_stiffness)
+
+
+@functools.lru_cache(maxsize=16)
+def _divided(pieces: tuple[Piece, ...], around: int, radial: int, equal_stiffness: bool) -> SectionGrid:
+    """Do as `divided_sections`. A search for a mesh changes the numbers along the robot more often than those of the section."""
     if any(len(piece.lumens) > 1 for piece in pieces):
         outlines, channels = channels_of(list(pieces))
         return lumen_grid(outlines, channels, around, radial)

@@ -157,7 +157,7 @@ class TipObserver:
         self._applied, self._applied_at = self._applied + step, now
         if not self._history.newest.touching:
             self._followed = self._followed + step
-        return dataclasses.replace(target, tip_position=target.tip_position - self._applied)
+        return target.with_tip_at(target.tip_position - self._applied)
 
     def status(self, now: float) -> TrackerStatus:
         """Return the state of the tracker at `now` (s)."""

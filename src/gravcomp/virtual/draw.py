@@ -16,6 +16,7 @@
 All distributions are uniform. Every number is drawn whether it is used or not, so that giving one value changes no other.
 """
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Callable
@@ -134,16 +135,20 @@ def _with_true_cables(
         drawn["cable radii"] = f"+-{100 * _RADIUS_SPREAD:g} %"
     if tendons.angle_offset is None and count:
         drawn["cable angles"] = f"+-{math.degrees(_ANGLE_SPREAD):g} deg"
+    turns = _ANGLE_SPREAD * angle if tendons.angle_offset is None else np.full(count, tendons.angle_offset)
+    relative = tendons.radius_offset is None
+    offsets = _RADIUS_SPREAD * radius if tendons.radius_offset is None else np.full(count, tendons.radius_offset)
+    moved = [_moved(*values, relative) for values in zip(robot.cables, offsets.tolist(), turns.tolist())]
+    with contextlib.suppress(ValueError):  # mostly all places are inside the body, and one check is enough
+        return dataclasses.replace(robot, cables=tuple(moved))
     for index in range(count):
-        turn = _ANGLE_SPREAD * angle[index] if tendons.angle_offset is None else tendons.angle_offset
-        robot = _with_moved_cable(robot, index, _RADIUS_SPREAD * radius[index], turn, tendons, section)
+        robot = _with_moved_cable(robot, index, float(offsets[index]), float(turns[index]), tendons, section)
     return robot
 
 
-def _with_moved_cable(robot: Robot, index: int, drawn_radius: float, turn: float, tendons: Tendons, section: str) -> Robot:
+def _with_moved_cable(robot: Robot, index: int, offset: float, turn: float, tendons: Tendons, section: str) -> Robot:
     """The robot with one cable moved. A drawn place is moved back towards the described one until it lies inside the body."""
     relative = tendons.radius_offset is None
-    offset = drawn_radius if tendons.radius_offset is None else tendons.radius_offset
     given = not relative or tendons.angle_offset is not None
     for part in (1.0,) if given else (1.0, 0.5, 0.2, 0.0):
         moved = _moved(robot.cables[index], part * offset, turn if given else part * turn, relative)

@@ -49,17 +49,15 @@ def read_joint_positions(path: str | Path, names: Sequence[str]) -> tuple[np.nda
 
 def _messages(path: str | Path, kind: str, wanted: Any) -> Any:
     """Yield the time of reception (ns) and the message of each message of a type, on the wanted topics. Raises BagError."""
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.rosbag2 import ReaderError
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.rosbag2 import Reader
 
+    from gravcomp.recordings.bags.decoding import UNREADABLE, decoded
     from gravcomp.recordings.bags.recovery import readable
 
     try:
-        with AnyReader([readable(path).path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        with Reader(readable(path).path) as reader:
             chosen = [c for c in reader.connections if c.msgtype == kind and wanted(c.topic)]
             for connection, received, raw in reader.messages(chosen) if chosen else ():
-                yield received, reader.deserialize(raw, connection.msgtype)
-    except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
+                yield received, decoded(connection, raw)
+    except UNREADABLE as error:
         raise BagError(f"{path}: is not a readable bag: {error}") from error

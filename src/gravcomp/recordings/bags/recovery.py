@@ -11,7 +11,6 @@ import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer
@@ -23,9 +22,6 @@ from gravcomp.recordings.bags.cut_sqlite import repaired
 from gravcomp.recordings.bags.definitions import Definitions
 from gravcomp.recordings.bags.errors import BagError
 from gravcomp.recordings.bags.storage import is_compressed, message_of, storage_files, uncompressed
-
-if TYPE_CHECKING:
-    from rosbags.highlevel import AnyReader
 
 _VERSION = 3  # of what is saved: 2 has MCAP messages that are not in the order of their times; 3 is without unknown types
 _LEFT_OUT = "left_out.txt"  # next to a copy that lacks topics: which
@@ -79,7 +75,7 @@ def _read_through(path: Path, progress: Callable[[float], None] | None = None) -
     return count
 
 
-def share_read(reader: "Reader | AnyReader", received: int) -> float:
+def share_read(reader: Reader, received: int) -> float:
     """Return the share of a bag's time that is read with a message received at `received` ns."""
     return min(1.0, (received - reader.start_time) / max(reader.duration, 1))
 

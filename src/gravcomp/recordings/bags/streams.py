@@ -53,22 +53,20 @@ def read_streams(path: str | Path, wanted: Mapping[str, Wanted]) -> dict[str, St
     Raises BagError for a bag that cannot be read, for a topic that is missing, of another type or not unique, and for a topic
     that is not optional and has fewer than two messages.
     """
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.rosbag2 import ReaderError
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.rosbag2 import Reader
 
+    from gravcomp.recordings.bags.decoding import UNREADABLE, decoded
     from gravcomp.recordings.bags.recovery import readable
 
     try:
-        with AnyReader([readable(path).path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        with Reader(readable(path).path) as reader:
             found = {c.topic: c.msgtype for c in reader.connections}
             topics = {key: _topic(path, found, want) for key, want in wanted.items()}
             rows = {topic: Rows() for topic in topics.values() if topic}
             for connection, received, raw in reader.messages([c for c in reader.connections if c.topic in rows]):
-                message: Any = reader.deserialize(raw, connection.msgtype)
+                message = decoded(connection, raw)
                 rows[connection.topic].append(stamp_ns(message), received, _VALUES[connection.msgtype](message))
-    except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError) as error:
+    except UNREADABLE as error:
         raise BagError(f"{path}: is not a readable bag: {error}") from error
     streams: dict[str, Stream | None] = {}
     for key, topic in topics.items():

@@ -29,12 +29,10 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
     All messages are read once, to find damage, and those of the IMU once more; only the values of the IMU are kept. Raises
     RecordingError.
     """
-    from rosbags.highlevel import AnyReader, AnyReaderError
-    from rosbags.rosbag2 import ReaderError
-    from rosbags.serde import SerdeError
-    from rosbags.typesys import Stores, get_typestore
+    from rosbags.rosbag2 import Reader
 
     from gravcomp.recordings.bags import BagError
+    from gravcomp.recordings.bags.decoding import UNREADABLE, decoded
     from gravcomp.recordings.bags.recovery import readable, share_read
 
     path = Path(path)
@@ -44,7 +42,7 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
         raise RecordingError(str(error)) from error
     damage = (f"damaged ({whole.problem}): read up to the damage, {whole.messages} messages",) if whole.problem else ()
     try:
-        with AnyReader([whole.path], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as reader:
+        with Reader(whole.path) as reader:
             name = _choose(reader.connections, topic, path)
             prefix = name[: -len("imu/data_raw")] if name.endswith("imu/data_raw") else name.rsplit("/", 1)[0] + "/"
             temperatures = [c.topic for c in reader.connections if c.msgtype == TEMPERATURE and c.topic.startswith(prefix)]
@@ -55,9 +53,9 @@ def read_rosbag(path: str | Path, topic: str | None = None, progress: Callable[[
             for i, (connection, received, raw) in enumerate(reader.messages([c for c in reader.connections if c.topic in rows])):
                 if progress is not None and i % _REPORTED == 0:
                     progress(_CHECKED + (1.0 - _CHECKED) * share_read(reader, received))
-                message: Any = reader.deserialize(raw, connection.msgtype)
+                message = decoded(connection, raw)
                 rows[connection.topic].append(stamp_ns(message), received, _values(message))
-    except (AnyReaderError, ReaderError, SerdeError, OSError, KeyError, ValueError) as error:
+    except (*UNREADABLE, ValueError) as error:
         if isinstance(error, RecordingError):
             raise
         raise RecordingError(f"{path}: is not a readable rosbag2 recording: {error}") from error
