@@ -72,11 +72,12 @@ def with_chosen_size(robot: Robot) -> Robot:
     if best in costs and (estimate := estimated_error(MeshedModel(_with(robot, body, best)))) is not None:
         sizes[best] = estimate
     if not sizes or sizes[best].error > ACCURACY:
+        released = " with the cables released" if sizes and sizes[best].released else ""
         _LOGGER.warning(
             "the tetrahedra chosen for '%s', of %.3g mm, leave an estimated error of %s; wanted: %g %% of the length",
             robot.name,
             1e3 * best,
-            f"{100 * sizes[best].error:.2g} %" if sizes else "a size that is not known",
+            f"{100 * sizes[best].error:.2g} %{released}" if sizes else "a size that is not known",
             100 * ACCURACY,
         )
     write_whole(path, json.dumps({"element_size": best, "estimate": sizes.get(best)}))

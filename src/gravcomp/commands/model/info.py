@@ -163,9 +163,7 @@ def _mesh_error(described: "Robot", model: "RobotModel", sag: "Shape") -> dict[s
     robot = model.robot
     elements = robot.elements
     if elements is None:  # a body from a file that is not divided along its axis
-        return _file_error(
-            model, chosen_estimate(described) if described.body and described.body.placed().kind == "tri3" else None
-        )
+        return _file_error(model, chosen_estimate(described))
     if described.elements is None:
         error = chosen_mesh(described).error
         return {
