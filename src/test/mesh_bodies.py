@@ -1,5 +1,6 @@
-"""Small bodies for tests, in mm, along z from the origin: a tapered tube of tetrahedra and its surface."""
+"""Small bodies for tests, in mm, along z from the origin: a tapered tube of tetrahedra and its surface, and bodies of boxes."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,3 +40,19 @@ def rounded(nodes: np.ndarray) -> np.ndarray:
     """The nodes (n, 3) with the tip of the tube rounded."""
     over = np.clip(nodes[:, 2] / LENGTH - 0.9, 0.0, None) * 10.0
     return nodes - np.outer(over * np.hypot(nodes[:, 0], nodes[:, 1]), [0.0, 0.0, 1.0])
+
+
+def boxes(x: Sequence[float], y: Sequence[float], z: Sequence[float], filled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (n, 3) and triangles (f, 3), facing outward, around the cells between planes at x, y and z that are filled."""
+    numbers = np.arange(len(x) * len(y) * len(z)).reshape(len(x), len(y), len(z))
+    around = np.pad(filled, 1)
+    triangles = []
+    for axis in range(3):
+        for side in (-1, 1):
+            outer = np.argwhere(filled & ~np.roll(around, -side, axis=axis)[1:-1, 1:-1, 1:-1])
+            outer[:, axis] += side > 0
+            across, up = (np.eye(3, dtype=int)[(axis + turn) % 3] for turn in (1, 2))
+            a, b, c, d = (numbers[tuple((outer + step).T)] for step in (0 * up, across, across + up, up)[::side])
+            triangles += [np.column_stack([a, b, c]), np.column_stack([a, c, d])]
+    used, faces = np.unique(np.vstack(triangles), return_inverse=True)
+    return np.stack(np.meshgrid(x, y, z, indexing="ij"), axis=-1).reshape(-1, 3)[used], faces.reshape(-1, 3)

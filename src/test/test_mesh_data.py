@@ -5,7 +5,11 @@ import pytest
 
 from gravcomp.description import Cable, Material, MeshBody, Robot
 from gravcomp.experiments.measured import default_folder
+from gravcomp.mesh import body_mesh
 from gravcomp.mesh_files import Placement, placed_body
+from gravcomp.mesh_files.filling import shapes
+from gravcomp.mesh_files.repair_surface import enclosed_volume
+from gravcomp.mesh_files.repair_volume import cell_volumes
 from gravcomp.simulation import Simulator
 
 FOLDER = default_folder() / "mesh"
@@ -41,6 +45,19 @@ def test_the_tentacle_has_a_bent_axis_that_runs_inside_it():
     inside = np.abs(angle / (4.0 * np.pi) - 1.0) < 1e-6
     assert inside.mean() > 0.9  # it has notches, which the smooth axis may touch
     assert body.axis.bent and 0.16 < body.length < 0.20
+
+
+@pytest.mark.slow
+def test_the_tentacle_is_filled_though_a_union_left_edges_of_6_um(monkeypatch, tmp_path):
+    for name in ("gmsh", "wildmeshing"):
+        pytest.importorskip(name, reason="the meshers are optional: ./gravcomp mesh install", exc_type=(ImportError, OSError))
+    monkeypatch.setenv("GRAVCOMP_CACHE", str(tmp_path))
+    body = MeshBody(str(FOLDER / "Tentacle.stl"), axis="auto", element_size=6e-3)
+    mesh = body_mesh(Robot("body", body=body))
+    surface = body.placed()
+    volume = cell_volumes(mesh.nodes, mesh.elements[:, :4], "tet4").sum()
+    assert volume == pytest.approx(enclosed_volume(surface.nodes, surface.cells), rel=3e-3)
+    assert shapes(mesh.nodes, mesh.elements[:, :4]).min() > 0.08
 
 
 def test_the_finger_hangs_from_its_base():

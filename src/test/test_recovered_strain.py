@@ -7,10 +7,11 @@ import pytest
 from mesh_bodies import TAPERED_TUBE
 
 from gravcomp.commands.model.info import _file_error
-from gravcomp.description import Elements, Robot, Segment, load_robot_file
+from gravcomp.description import Cable, Elements, Robot, Segment, load_robot_file
+from gravcomp.full_model import recovered_strain
 from gravcomp.full_model.mesh_loads import _turned, mesh_loads, shapes_under
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.recovered_strain import estimated_error
+from gravcomp.full_model.recovered_strain import can_be_estimated, estimated_error, too_long
 
 
 def test_the_estimate_is_about_the_distance_from_a_finer_mesh():
@@ -27,6 +28,22 @@ def test_the_estimate_is_about_the_distance_from_a_finer_mesh():
     estimate = estimated_error(coarse)
     assert 0.4 * distance < estimate.error < 2.0 * distance
     assert estimate.element_length == pytest.approx(0.08 / 9, rel=1e-6) and 0.0 < estimate.place < 0.08
+
+
+def test_where_cables_make_a_step_too_long_the_error_is_estimated_without_them(monkeypatch):
+    shipped = load_robot_file("mesh_body").robot
+    body = dataclasses.replace(shipped.body, file=str(TAPERED_TUBE))
+    # Straight from the clamp to the tip: its pieces tie distant sections together.
+    cable = Cable("c", via_points=((3e-3, 0.0, 0.01), (2.5e-3, 0.0, 0.07)))
+    model = MeshedModel(dataclasses.replace(shipped, body=body, cables=(cable,)))
+    without = MeshedModel(dataclasses.replace(model.robot, cables=()))
+    assert too_long(without) < 0.7 * too_long(model)
+    monkeypatch.setattr(recovered_strain, "_LONGEST", 0.8 * too_long(model))
+    estimate, alone = estimated_error(model), estimated_error(without)
+    assert estimate.released and not alone.released and estimate.error == pytest.approx(alone.error, rel=1e-6)
+    assert "with the cables released only" in _file_error(model, estimate)["refinement"]
+    monkeypatch.setattr(recovered_strain, "_LONGEST", 0.8 * too_long(without))
+    assert estimated_error(model) is None and not can_be_estimated(model)
 
 
 @pytest.mark.slow

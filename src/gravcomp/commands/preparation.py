@@ -5,6 +5,7 @@ import subprocess
 from typing import TYPE_CHECKING
 
 from gravcomp.commands import output
+from gravcomp.commands.mesh_steps import mesh_steps
 from gravcomp.launcher import compilation
 from gravcomp.launcher.model_builder import ModelBuilder
 from gravcomp.launcher.robot_graph import check_robot_file
@@ -44,9 +45,7 @@ def choose_mesh(described: "Robot") -> None:
         if is_chosen(described):
             return
     what = f"choosing the mesh of {described.name}, once for this robot (up to a minute)"
-    if not output.console().is_terminal:
-        output.note(what)  # there a status is not shown
-    with output.busy(what), contextlib.suppress(MeshError):
+    with mesh_steps(what), contextlib.suppress(MeshError):
         with_chosen_elements(described)
 
 

@@ -24,7 +24,7 @@ from gravcomp.full_model.mesh_loads import (
     shapes_under,
 )
 from gravcomp.full_model.model import MeshedModel
-from gravcomp.full_model.recovered_strain import too_long
+from gravcomp.full_model.recovered_strain import can_be_estimated
 from gravcomp.full_model.robot_model import RobotModel
 from gravcomp.mesh import MeshError
 from gravcomp.mesh.refinement import refined
@@ -46,7 +46,7 @@ def error_of_mesh(robot: Robot, progress: Progress = lambda stage: None) -> floa
     finer = _twice_as_fine(model)
     work = _work(finer)
     if work > _MOST_WORK:
-        estimate = "" if too_long(model) > 1.0 else "; `model info` prints an estimate"
+        estimate = "; `model info` prints an estimate" if can_be_estimated(model) else ""
         raise MeshError(
             f"the mesh twice as fine has {finer.pattern.n} unknowns in {len(finer.pattern.size)} levels: a step takes"
             f" {work / _MOST_WORK:.1f} times as long as allowed, and the error is not measured{estimate}"

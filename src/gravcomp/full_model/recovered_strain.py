@@ -9,6 +9,7 @@ On tapered tubes bent to a right angle the estimate is 0.5 to 1.1 times the dist
 large at the clamp only, that of tetrahedra is several times too large (`src/test/test_recovered_strain.py`).
 """
 
+import dataclasses
 from typing import NamedTuple
 
 import numpy as np
@@ -20,30 +21,40 @@ from gravcomp.mesh.robot_axis import rest_tip
 
 # The most multiplications of a factor, some tenths of a second of one core: the loads take some fifty.
 _MOST_WORK = 3e9
+# How many times as long a step may take for one mesh, which is not to be compared with others.
+_LONGEST = 2.0
 
 
 class MeshEstimate(NamedTuple):
     """Estimate of a mesh's error, under the worst of the loads.
 
     error: of the tip over the length; load: its name; place: height in m around which the error is; element_length: how long
-    elements are along the robot there, in m.
+    elements are along the robot there, in m; released: only with the cables released, as with them a step takes too long.
     """
 
     error: float
     load: str
     place: float
     element_length: float
+    released: bool = False
 
 
 def too_long(model: MeshedModel) -> float:
-    """Return how many times as long as it may a step of the model takes for its error to be estimated."""
+    """Return how many times as long as it may a step of the model takes for meshes like it to be compared."""
     return float((model.pattern.size.astype(float) ** 3).sum()) / _MOST_WORK
+
+
+def can_be_estimated(model: MeshedModel) -> bool:
+    """Return whether a step is short enough for the error of the model's mesh to be estimated, which takes up to a minute."""
+    return _short_enough(model) is not None
 
 
 def estimated_error(model: MeshedModel) -> MeshEstimate | None:
     """Return the estimate under the loads of `mesh_loads`; None where no equilibrium is found or a step takes too long."""
-    if too_long(model) > 1.0:
+    short = _short_enough(model)
+    if short is None:
         return None
+    released, model = short is not model, short
     loads = mesh_loads(model)
     found = shapes_under(model, loads)
     tip, _ = rest_tip(model.robot)
@@ -57,8 +68,18 @@ def estimated_error(model: MeshedModel) -> MeshEstimate | None:
         share = wrong / wrong.sum()
         error = part * float(np.linalg.norm(reached - tip)) / model.length
         place, long = float(share @ heights.mean(axis=1)), float(share @ np.ptp(heights, axis=1))
-        estimates.append(MeshEstimate(error, load.name, place, long))
+        estimates.append(MeshEstimate(error, load.name, place, long, released))
     return max(estimates, key=lambda estimate: estimate.error) if estimates else None
+
+
+def _short_enough(model: MeshedModel) -> MeshedModel | None:
+    """The model, or without its cables, which tie distant sections together, where a step of it is short enough."""
+    if too_long(model) <= _LONGEST:
+        return model
+    if not model.robot.cables:
+        return None
+    released = MeshedModel(dataclasses.replace(model.robot, cables=()), model.mesh)
+    return released if too_long(released) <= _LONGEST else None
 
 
 def _energies(model: MeshedModel, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,30 +1,38 @@
-"""Filling a closed surface with tetrahedra: by Gmsh, and by fTetWild where Gmsh's elements are badly shaped.
+"""Filling a closed surface with tetrahedra: by Gmsh, and through fTetWild's surface where Gmsh's elements are badly shaped.
 
 Gmsh comes first because it keeps flat faces flat, takes a second, and gives the same mesh every time; it also reads STEP files.
-Surfaces with needles and tiny edges, as scans and unions have, it fills with flat elements or not at all. fTetWild (Hu et al.
-2020, package wildmeshing, MPL 2) fills any surface with well-shaped elements, whose surface is within a thousandth of the size;
-it takes ten times as long. TetGen has the AGPL; pytetwild, another package of fTetWild, loads VTK.
+It keeps all edges where the surface turns sharply. Surfaces with needles, tiny edges and parts that nearly touch, as scans and
+unions have them, get flat elements from it or none. fTetWild (Hu et al. 2020, package wildmeshing, MPL 2) fills any surface with
+well-shaped elements, whose surface is within `TOLERANCE`; it takes ten times as long, and minutes for small elements. So it runs
+once, coarsely (`coarse_filling`), and Gmsh makes smaller elements in the surface of that. TetGen has the AGPL; pytetwild,
+another package of fTetWild, loads VTK.
 """
 
-import tempfile
-from pathlib import Path
+import logging
+import time
+from collections.abc import Callable
 
 import numpy as np
 
 from gravcomp.cache import cache_path, content_key
+from gravcomp.mesh_files.coarse_filling import coarse_filling
 from gravcomp.mesh_files.errors import MeshError
-from gravcomp.mesh_files.gmsh_filling import by_gmsh
+from gravcomp.mesh_files.flat_ends import with_flat_ends
+from gravcomp.mesh_files.gmsh_filling import LONGEST, by_gmsh, within_triangles
 from gravcomp.mesh_files.gmsh_library import GmshMissing
+from gravcomp.mesh_files.kept_arrays import kept
 from gravcomp.mesh_files.repair_surface import enclosed_volume
 from gravcomp.mesh_files.repair_volume import boundary_triangles, cell_volumes
 from gravcomp.mesh_files.wild_filling import TOLERANCE, by_wildmeshing
 
-_FORMAT = 3
+_FORMAT = 4  # part of the key; to be raised when the filling changes
 # Shape of an element: 1 for a regular tetrahedron, 0 for a flat one. The worst one may not be below.
 _SHAPE = 0.05
 # Share of the volume by which elements may miss the body before another mesher is tried.
 _VOLUME = 0.05
-_FLAT = 0.95
+_LOGGER = logging.getLogger(__name__)
+_Mesh = tuple[np.ndarray, np.ndarray]
+_Mesher = Callable[[np.ndarray, np.ndarray, float, str], _Mesh]
 
 
 def filled(
@@ -43,15 +51,8 @@ def filled(
             f"{name}: about {expected:.2g} elements of this size fill the body; body.elements_max allows {elements_max}:"
             f" use element_size_mm: {1e3 * fits:.2g} or more, or raise elements_max (memory grows with it)"
         )
-    stored = cache_path("filled", content_key(_FORMAT, nodes, triangles, float(element_size)), ".npz")
-    if stored.exists():
-        with np.load(stored) as content:
-            found = content["nodes"], content["elements"]
-    else:
-        found = _meshed(nodes, triangles, length, element_size, volume, name)
-        with tempfile.NamedTemporaryFile(dir=stored.parent, suffix=".npz", delete=False) as partial:
-            np.savez(partial, nodes=found[0], elements=found[1])
-        Path(partial.name).replace(stored)
+    key = content_key(_FORMAT, nodes, triangles, float(element_size))
+    found = kept(cache_path("filled", key, ".npz"), lambda: _meshed(nodes, triangles, length, element_size, volume, name))
     if len(found[1]) > elements_max:
         raise MeshError(
             f"{name}: {len(found[1])} elements fill the body; body.elements_max allows {elements_max}:"
@@ -67,45 +68,59 @@ def size_of_elements(volume: float, count: int) -> float:
 
 def shapes(nodes: np.ndarray, elements: np.ndarray) -> np.ndarray:
     """Return the shape (k,) of linear tetrahedra: volume over that of a regular one with the same root mean square edge."""
-    corners = nodes[elements]
-    edges = corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]]
-    regular = ((edges**2).sum(axis=2).mean(axis=1)) ** 1.5 / (6.0 * np.sqrt(2.0))
+    regular = (_edge_lengths(nodes, elements) ** 2).mean(axis=1) ** 1.5 / (6.0 * np.sqrt(2.0))
     return cell_volumes(nodes, elements, "tet4") / np.maximum(regular, 1e-300)
 
 
 def _meshed(
     nodes: np.ndarray, triangles: np.ndarray, length: float, element_size: float, volume: float, name: str
 ) -> tuple[np.ndarray, np.ndarray]:
-    problems: list[str] = []
     diagonal = float(np.linalg.norm(np.ptp(nodes, axis=0)))
-    for mesher, within in ((by_gmsh, 1e-6 * diagonal), (by_wildmeshing, 2.0 * TOLERANCE * diagonal)):
+    exact, tolerant = 1e-6 * diagonal, 2.0 * TOLERANCE * diagonal
+    tried: list[str] = []
+
+    def attempt(what: str, mesher: _Mesher, surface: _Mesh, within: float) -> _Mesh | None:
+        """Return the filling; None, with the reason and the seconds in `tried`, where it fails or is bad."""
+        _LOGGER.info("%s: filled by %s with elements of %.3g mm", name, what, 1e3 * element_size)
+        start = time.monotonic()
         try:
-            found = mesher(nodes, triangles, element_size, name)
+            points, elements = with_flat_ends(*mesher(*surface, element_size, name), length, within)
         except GmshMissing:
             raise
         except MeshError as error:
-            problems.append(str(error))
-            continue
-        points, elements = _flattened(*found, length, within)
-        worst = float(shapes(points, elements).min()) if len(elements) else 0.0
-        share = float(cell_volumes(points, elements, "tet4").sum()) / volume
-        if worst >= _SHAPE and abs(share - 1.0) <= _VOLUME:
-            return points, elements
-        problems.append(f"{mesher.__name__[3:]}: worst shape of an element {worst:.2g}, volume {100 * share:.0f} % of the body's")
-    raise MeshError(f"{name}: the surface cannot be filled: {'; '.join(problems)}; use a smaller element_size_mm")
+            problem = str(error).removeprefix(f"{name}: ")
+        else:
+            worst = float(shapes(points, elements).min()) if len(elements) else 0.0
+            share = float(cell_volumes(points, elements, "tet4").sum()) / volume
+            if worst >= _SHAPE and abs(share - 1.0) <= _VOLUME:
+                return points, elements
+            problem = f"worst shape of an element {worst:.2g}, at least {_SHAPE:g}; volume {100 * share:.0f} % of the body's"
+        tried.append(f"{what}, {time.monotonic() - start:.1f} s: {problem}")
+        return None
+
+    found = attempt("Gmsh", by_gmsh, (nodes, triangles), exact)
+    if found is not None:
+        return found
+    _LOGGER.info("%s: %s", name, tried[-1])
+    start = time.monotonic()
+    try:
+        coarse = coarse_filling(nodes, triangles, length, name)
+    except MeshError as error:
+        tried.append(f"{time.monotonic() - start:.1f} s: {str(error).removeprefix(f'{name}: ')}")
+    else:
+        if _edge_lengths(*coarse).max() <= LONGEST * element_size:
+            found = attempt("fTetWild", lambda *_: coarse, coarse, exact)
+        if found is None:
+            used, faces = np.unique(boundary_triangles(coarse[1]), return_inverse=True)
+            surface = coarse[0][used], faces.reshape(-1, 3)
+            found = attempt("Gmsh in fTetWild's surface", within_triangles, surface, exact)
+            found = found or attempt("fTetWild", by_wildmeshing, surface, tolerant)
+        if found is not None:
+            return found
+    raise MeshError(f"{name}: the surface cannot be filled: {'; '.join(tried)}. Use a smaller element_size_mm")
 
 
-def _flattened(nodes: np.ndarray, elements: np.ndarray, length: float, within: float) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes and elements (positively oriented) with the nodes of faces at z = 0 and z = length, up to `within`, put there."""
-    elements = elements.copy()
-    inverted = cell_volumes(nodes, elements, "tet4") < 0.0
-    elements[inverted] = elements[inverted][:, [0, 2, 1, 3]]
-    faces = boundary_triangles(elements)
-    corners = nodes[faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    upward = normal[:, 2] / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
-    nodes = nodes.copy()
-    for plane, sign in ((0.0, -1.0), (length, 1.0)):
-        flat = (sign * upward > _FLAT) & (np.abs(corners[:, :, 2] - plane) <= within).all(axis=1)
-        nodes[np.unique(faces[flat]), 2] = plane
-    return nodes, elements
+def _edge_lengths(nodes: np.ndarray, elements: np.ndarray) -> np.ndarray:
+    """The lengths (k, 6) of the edges of linear tetrahedra."""
+    corners = nodes[elements]
+    return np.linalg.norm(corners[:, [0, 0, 0, 1, 1, 2]] - corners[:, [1, 2, 3, 2, 3, 3]], axis=2)

@@ -78,17 +78,23 @@ def mesh_of(gmsh: Any, element_type: int, corners: int) -> tuple[np.ndarray, np.
 
 @contextlib.contextmanager
 def _silent() -> Iterator[None]:
-    """Keep what Gmsh's libraries print, whatever their options say, away from stdout, where commands print their result."""
+    """Keep what Gmsh's libraries print, whatever their options say, away from stdout, where commands print their result.
+
+    And away from stderr, where they print the same line for each patch that they cannot smooth.
+    """
     sys.stdout.flush()
-    kept = os.dup(1)
+    sys.stderr.flush()
+    kept = [os.dup(stream) for stream in (1, 2)]
     try:
         with open(os.devnull, "w", encoding="utf-8") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
+            for stream in (1, 2):
+                os.dup2(nowhere.fileno(), stream)
         yield
     finally:
         ctypes.CDLL(None).fflush(None)
-        os.dup2(kept, 1)
-        os.close(kept)
+        for stream, before in zip((1, 2), kept):
+            os.dup2(before, stream)
+            os.close(before)
 
 
 @contextlib.contextmanager

@@ -32,7 +32,10 @@ def by_wildmeshing(nodes: np.ndarray, triangles: np.ndarray, element_size: float
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]
             raise MeshError(f"{name}: fTetWild cannot fill the surface (exit code {done.returncode}: {last})")
         with np.load(result) as content:
-            return content["nodes"], content["elements"]
+            points, elements = content["nodes"], content["elements"]
+        if len(elements) == 0:
+            raise MeshError(f"{name}: fTetWild made no tetrahedra")
+        return points, elements
 
 
 def _fill(given: str, result: str) -> None:

@@ -13,6 +13,7 @@ from gravcomp.commands.model.reach import text as reach_text
 
 if TYPE_CHECKING:
     from gravcomp.description import Robot, RobotFile
+    from gravcomp.full_model.recovered_strain import MeshEstimate
     from gravcomp.simulation import RobotModel, Shape
 
 _GRAVITY = 9.81
@@ -156,12 +157,13 @@ def _mesh_error(described: "Robot", model: "RobotModel", sag: "Shape") -> dict[s
 
     from gravcomp.config import to_mapping
     from gravcomp.full_model.mesh_choice import ACCURACY, chosen_mesh
+    from gravcomp.full_model.size_choice import chosen_estimate
     from gravcomp.simulation import Simulator
 
     robot = model.robot
     elements = robot.elements
     if elements is None:  # a body from a file that is not divided along its axis
-        return _file_error(model)
+        return _file_error(model, chosen_estimate(described))
     if described.elements is None:
         error = chosen_mesh(described).error
         return {
@@ -183,15 +185,18 @@ def _mesh_error(described: "Robot", model: "RobotModel", sag: "Shape") -> dict[s
     }
 
 
-def _file_error(model: "RobotModel") -> dict[str, Any]:
-    """Return the estimated error of the mesh of a body from a file, and what to do about it."""
+def _file_error(model: "RobotModel", estimate: "MeshEstimate | None" = None) -> dict[str, Any]:
+    """Return the estimated error of the mesh of a body from a file, and what to do about it.
+
+    estimate: where it is known already.
+    """
     import math
 
     from gravcomp.full_model.mesh_choice import ACCURACY
     from gravcomp.full_model.recovered_strain import estimated_error
     from gravcomp.mesh.division import why_not_swept
 
-    estimate, body = estimated_error(model), model.robot.body
+    estimate, body = estimate or estimated_error(model), model.robot.body
     assert body is not None
     if estimate is None:
         return {
@@ -211,6 +216,10 @@ def _file_error(model: "RobotModel") -> dict[str, Any]:
             again = chosen if reason is None else "hexahedra of 20 nodes are the fewest"
             found = f"{fitting:.2g} mm in place of {1e3 * estimate.element_length:.2g} mm {where}"
             advice = f"too coarse; use elements of {found}; {again}"
+    if estimate.released:
+        advice += (
+            "; with the cables released only: bent by them its error is not estimated, as they tie distant sections together"
+        )
     return {"estimated_error_pct": 100 * estimate.error, "worst_load": estimate.load, "refinement": advice}
 
 
