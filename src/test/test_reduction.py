@@ -355,6 +355,8 @@ def test_a_reduction_is_as_small_as_serves_nearly_all_shapes_that_the_whole_serv
     assert size((r - 4, 8), 95) == (r - 4, 8)
     assert size((r - 8, 4), 94) == (r, strains)  # too few of them
     assert asked.count((r - 8, 4)) == 11 + 2 + 11  # a part that cannot serve enough any more is left
+    monkeypatch.setattr("gravcomp.training.smallest.tip_errors", served((r - 8, 4), 54, 54))
+    assert smallest(model, whole, list(range(110)), r - 8, 1e-4) is whole  # the shapes show too little
     assert size((r - 4, 8), 100) == (r - 4, 8) and elasticity.of_first(r - 4, 8).linear.shape == (r - 4, r + 4)
 
 

@@ -3,7 +3,8 @@
 A step takes time in proportion to r^2 k for r modes and k strains. How many of them a robot needs is known only when both are
 there: a slender robot is served as exactly with half of the principal strains, a very soft one needs nearly all. A shape is
 served where the reduced tip is near enough to that of the full model. The cheapest part is taken that serves as many of the
-shapes as the whole, but for a few: some are at the end of the equilibria, where the least difference decides.
+shapes as the whole, but for a few: some are at the end of the equilibria, where the least difference decides. Where that holds
+for most of them, they do not show what the fast motion of such a robot needs, and the whole is kept.
 """
 
 import math
@@ -19,6 +20,7 @@ from gravcomp.training.trained_shapes import evenly
 _SHAPES = 120
 _STEP = 4  # modes, and strains: compiled sums take four terms at a time
 _MOST = 0.95  # of the shapes that the whole serves
+_SHOWING = 0.5  # of all shapes: where the whole serves fewer, it is kept
 _AT_ONCE = 10  # shapes; a part that cannot serve enough of them any more is left
 
 
@@ -53,8 +55,9 @@ def smallest(
     most = reduced.elasticity.linear.shape[1] - r
     parts = [(m, e) for m in range(min(modes, r), r + 1, _STEP) for e in range(_STEP, most + 1, _STEP)]
     parts.sort(key=lambda part: part[0] ** 2 * sum(part))
-    enough = math.ceil(_MOST * served(reduced, 0))
-    for number, part in enumerate(parts if enough else []):
+    by_whole = served(reduced, 0)
+    enough = math.ceil(_MOST * by_whole)
+    for number, part in enumerate(parts if by_whole >= _SHOWING * len(shown) else []):
         progress(number / len(parts))
         if served(reduced.of_first(*part), enough) >= enough:
             return whole.of_first(*part)
