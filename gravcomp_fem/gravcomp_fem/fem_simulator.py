@@ -231,11 +231,13 @@ class FemSimulator(ManagedNode):
             refused_messages=self._refused,
             **values,
         )
+        if isinstance(self._simulator, Simulator):
+            self._simulator.measure_error()  # the command to this sample is on its way; the next one comes some ms later
 
     def _shape(self, gravity: np.ndarray, interval: float | None, carried: tuple[Wrench, ...]) -> Shape:
         """Return the shape; interval: s since the last sample, or None when it is not known; carried: external loads."""
         if not self._dynamic:  # a body that creeps is relaxed in its first equilibrium
-            return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried)
+            return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried, later=True)
         if interval is None:
             return self._simulator.settle(gravity, self._cables)
         return self._simulator.step(gravity, self._cables, duration=interval, wrench=carried)

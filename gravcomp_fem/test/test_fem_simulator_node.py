@@ -164,3 +164,13 @@ def test_loads_and_measurements_that_cannot_be_right_are_named_and_change_nothin
     assert not heavy.successful and "the cables hold at most" in heavy.reason
     carried = loaded.simulator._loads.carried(GRAVITY, 1e-9 * loaded.now)
     assert np.abs([one.force for one in carried]).max(initial=0.0) < 1e-6
+
+
+def test_a_shape_is_published_before_its_error_is_measured(stand):
+    """The measurement takes as long as a step of the full model, and the command waits for the shape only."""
+    seen, publish = [], stand.simulator._deformation.publish
+    stand.simulator._deformation.publish = lambda message: (seen.append("published"), publish(message))
+    stand.simulator._simulator.measure_error = lambda: seen.append("measured")
+    stand.sample()
+    stand.sample()
+    assert seen == 2 * ["published", "measured"]

@@ -204,14 +204,41 @@ def test_the_full_model_is_used_out_of_range_and_the_reduced_one_again_afterward
     assert models[-1] == "reduced"
 
 
-def test_a_large_measured_error_ends_the_use_of_the_reduced_model(built):
+@pytest.mark.parametrize("asked", [True, False], ids=["when asked", "with the next step"])
+def test_the_error_is_measured_after_a_step_as_in_it(built, asked):
+    """The memory of a body that creeps is that from which the step was taken."""
+    robot = built[0].robot.with_material(prony=(PronyTerm(0.1, 0.3), PronyTerm(0.1, 6.0)))
+    within, after = Simulator(robot), Simulator(robot)
+    error = after._serving.reduced.error
+    measured = 0
+    for share in np.linspace(0.0, 1.0, 61):
+        gravity = 9.81 * np.array([np.sin(np.pi / 2 * share), 0.0, -np.cos(np.pi / 2 * share)])
+        shape, own = within.step(gravity, duration=0.01), after.step(gravity, duration=0.01, later=True)
+        assert own.tip_position == pytest.approx(shape.tip_position, abs=1e-12)
+        if shape.error_estimate != error:  # measured in this step
+            assert (own.model, own.error_estimate) == ("reduced", error)
+            measured, error = measured + 1, shape.error_estimate
+            if asked:
+                after.measure_error()
+                assert after._serving._error == pytest.approx(error, rel=1e-6)
+                error = within._serving._error = after._serving._error
+            else:
+                again = after.step(gravity, duration=0.01)
+                assert again.error_estimate == pytest.approx(error, rel=1e-6)
+                within.step(gravity, duration=0.01)
+                error = within._serving._error = after._serving._error
+    assert measured >= 2 and within._serving.trusted
+
+
+@pytest.mark.parametrize("later", [False, True])
+def test_a_large_measured_error_ends_the_use_of_the_reduced_model(built, later):
     model, _ = built
     simulator = Simulator(model)
     serving = simulator._serving
     # Elasticity of a body that is 30 % stiffer.
     wrong = dataclasses.replace(serving.reduced.elasticity, linear=1.14 * serving.reduced.elasticity.linear)
     serving = simulator._serving = ReducedServing(model, dataclasses.replace(serving.reduced, elasticity=wrong), simulator.solver)
-    models = [simulator.step(np.array([-9.81, 0.0, 0.0])).model for _ in range(40)]
+    models = [simulator.step(np.array([-9.81, 0.0, 0.0]), later=later).model for _ in range(40)]
     assert models[-1] == "full"
     assert "the tip error of the reduced model is" in serving.reason
 

@@ -62,6 +62,8 @@ class ReducedServing:
         at_rest = np.zeros(reduced.size), np.zeros(reduced.elasticity.linear.shape[1])
         self._memory = Memory.of(branches.pop() if self._uniform else (), *at_rest)
         self._tolerance = _TOLERANCE * model.length
+        # Of the step whose error is to be measured: the arguments, and the memory from which it was taken.
+        self._due: tuple[np.ndarray, CableInput, float | None, PointLoads | None, Memory] | None = None
         self._tracker = ReducedTracker(reduced, model.length)
         self._loads = ReducedLoads(model, reduced.basis)
         self._itself: NearItself | None = None
@@ -79,7 +81,7 @@ class ReducedServing:
         self._error, self._beyond_range = self.reduced.error, ""
         self._mark(self._tracker.state, np.zeros(3))
         self._memory = self._memory.relaxed(self._tracker.state.q, self._tracker.strain)
-        self._until_return = 0
+        self._until_return, self._due = 0, None
         self.reason = ""
 
     def warm_up(self) -> None:
@@ -95,7 +97,7 @@ class ReducedServing:
 
     def stand_by(self) -> None:
         """Wait for a shape of the full model, which is used until both models agree."""
-        self.reason, self._until_return = "the reduced model has just been built", 0
+        self.reason, self._until_return, self._due = "the reduced model has just been built", 0, None
         # What the full model's branches hold is not known here. It fades, and both models have to agree before this one is used.
         self._memory = self._memory.relaxed(*self._projected(self._full.state))
 
@@ -116,12 +118,19 @@ class ReducedServing:
         return self._tracker.tip_compliance()
 
     def step(
-        self, gravity: np.ndarray, cables: CableInput, h: float | None = None, loads: PointLoads | None = None
+        self,
+        gravity: np.ndarray,
+        cables: CableInput,
+        h: float | None = None,
+        loads: PointLoads | None = None,
+        later: bool = False,
     ) -> Shape | None:
         """Return the shape under gravity (3,) and the cables' input, tracked from the last one; None: use the full model.
 
-        h: s in which the body has crept since the last shape; None: it has relaxed. loads: act in addition.
+        h: s in which the body has crept since the last shape; None: it has relaxed. loads: act in addition. later: the error of
+        this shape is measured by `measure`, if it is due.
         """
+        self.measure()
         if not self.trusted:
             return None
         started = time.perf_counter()
@@ -144,12 +153,23 @@ class ReducedServing:
         moved = self._since_check >= _CHECK_AT_LEAST and self._has_moved(state, gravity)
         if moved or self._since_check >= _CHECK_EVERY:
             self._mark(state, gravity)
-            self._error = self._measured_error(gravity, cables, h, loads)
-            if not self._error < self._tolerance:
-                self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
+            self._due = gravity, cables, h, loads, self._memory
+            if not later:
+                self.measure()
+            if not self.trusted:
                 return None
         self._remember(state.q, self._tracker.strain, h)
         return self._shape(state, gravity, started)
+
+    def measure(self) -> None:
+        """Measure the error of the last shape if that is due; where it is too large, the full model is used from there."""
+        if self._due is None:
+            return
+        gravity, cables, h, loads, memory = self._due
+        self._error = self._measured_error(gravity, cables, h, loads, memory)
+        self._due = None
+        if not self._error < self._tolerance:
+            self._leave(f"the tip error of the reduced model is {1e3 * self._error:.2f} mm", wait=_RETURN_AFTER)
 
     def take_over(
         self,
@@ -176,7 +196,7 @@ class ReducedServing:
     ) -> None:
         """Go to a shape of the full model, in h s; use the reduced model from there if both agree on it."""
         self.reason = self.reason or _UNTRAINED
-        self._until_return = _RETURN_AFTER
+        self._until_return, self._due = _RETURN_AFTER, None
         if not state.converged:
             return
         q, strain = self._projected(state)
@@ -218,14 +238,14 @@ class ReducedServing:
     def _leave(self, reason: str, wait: int) -> None:
         """Stop using the reduced model, for at least `wait` steps."""
         self.reason, self._until_return = reason, wait
-        self._hand_over()
+        self._hand_over(self._memory)
 
-    def _hand_over(self) -> None:
-        """Set the full model to the reduced model's shape, and its memory to that before the present step."""
+    def _hand_over(self, memory: Memory) -> None:
+        """Set the full model to the reduced model's shape and to a memory."""
         u, sliding, contact = self.displacements, self._tracker.sliding, self._tracker.contact
         if self._creep is not None and self._uniform:
             assert isinstance(self._model.elements, SolidElements)
-            self._creep.strain, self._creep.held = self._memory.at_points(self._model.elements, self.reduced.basis)
+            self._creep.strain, self._creep.held = memory.at_points(self._model.elements, self.reduced.basis)
         elif self._creep is not None:
             self._creep.relax(u)
         self._full.sliding = sliding
@@ -251,9 +271,11 @@ class ReducedServing:
             or any(abs(wound) > _WOUND * self._model.length for wound in (state.displacement - displacement).tolist())
         )
 
-    def _measured_error(self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None) -> float:
-        """Return the tip error of the reduced model in m, after a step of h s."""
-        self._hand_over()
+    def _measured_error(
+        self, gravity: np.ndarray, cables: CableInput, h: float | None, loads: PointLoads | None, memory: Memory
+    ) -> float:
+        """Return the tip error of the reduced model in m, after a step of h s from a memory."""
+        self._hand_over(memory)
         self._full.viscous = None if h is None or self._creep is None else self._creep.step(h)
         before = self._tip(self._full.state.u)
         self._beyond_range = beyond_range(self._model, self._full.state.u)

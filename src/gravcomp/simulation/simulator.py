@@ -124,6 +124,7 @@ class Simulator:
         tension: np.ndarray | None = None,
         duration: float | None = None,
         wrench: Load | tuple[Load, ...] | None = None,
+        later: bool = False,
     ) -> Shape:
         """Track the equilibrium from the last shape, for changes of the size of a control step.
 
@@ -133,8 +134,10 @@ class Simulator:
 
         gravity (3,) in m/s^2; displacement (m,) in m, positive: pulled in, NaN: released; or tension (m,) in N; neither: all
         cables are released. duration: s since the last step, in which a body with creep has crept (`full_model.creep`); None:
-        the body has relaxed, as after a long time. wrench: external forces and moments on cross-sections. Raises ValueError for
-        wrong lengths, numbers that are not finite, negative tensions, and a duration that is not positive.
+        the body has relaxed, as after a long time. wrench: external forces and moments on cross-sections. later: where the
+        reduced model's error is due to be measured, which takes as long as a step of the full model, leave that to
+        `measure_error`, or else to the next step. Raises ValueError for wrong lengths, numbers that are not finite, negative
+        tensions, and a duration that is not positive.
         """
         started = time.perf_counter()
         gravity, cables = self.checked(gravity, displacement, tension)
@@ -142,7 +145,7 @@ class Simulator:
             raise ValueError(f"duration is {duration} s; a positive number is needed")
         h = duration if self._creep.exists else None
         loads = PointLoads.of(self.model, wrench)
-        shape = self._serving.step(gravity, cables, h, loads) if self._serving else None
+        shape = self._serving.step(gravity, cables, h, loads, later) if self._serving else None
         if shape is not None:
             self._pace.found(gravity, cables)
             return shape
@@ -174,6 +177,11 @@ class Simulator:
         if shape.status != ShapeStatus.OK:
             return shape
         return dataclasses.replace(shape, status=ShapeStatus.FALLBACK, message=f"{reason}: the full model is used")
+
+    def measure_error(self) -> None:
+        """Measure the reduced model's error at the last shape if a step has left that for later; see `step`."""
+        if self._serving:
+            self._serving.measure()
 
     def tip_compliance(self) -> np.ndarray:
         """Return the displacement of the tip (3, 3) m/N by forces on it at given tensions, at the present shape.
