@@ -20,6 +20,7 @@ from numba import njit
 from gravcomp.materials import laws
 from gravcomp.materials.linear import add_linear_stress, add_linear_tangent
 from gravcomp.mechanics.kinematics import green_strain
+from gravcomp.reduction.row_products import add_row_products
 from gravcomp.rounding import REORDERED
 
 
@@ -172,27 +173,7 @@ def add_deviation_stiffness(of: LawDeviation, point: DeviationPoint, matrix: np.
                     e[0, p] * g_0[p] + e[1, p] * g_1[p] + e[2, p] * g_2[p] + e[3, p] * g_3[p] + e[4, p] * g_4[p]
                     + e[5, p] * g_5[p] + e[6, p] * g_6[p] + e[7, p] * g_7[p] + e[8, p] * g_8[p]
                 )  # fmt: skip
-        line, j = matrix[i], 0
-        while j + 4 <= i + 1:  # four entries at a time: the row is read less often
-            g_0, g_1, g_2, g_3 = of.gradient[j], of.gradient[j + 1], of.gradient[j + 2], of.gradient[j + 3]
-            k_0 = k_1 = k_2 = k_3 = np.float32(0.0)
-            for k in range(size):
-                x = row[k]
-                k_0 += x * g_0[k]
-                k_1 += x * g_1[k]
-                k_2 += x * g_2[k]
-                k_3 += x * g_3[k]
-            line[j] += k_0
-            line[j + 1] += k_1
-            line[j + 2] += k_2
-            line[j + 3] += k_3
-            j += 4
-        while j <= i:
-            g_0, k_0 = of.gradient[j], np.float32(0.0)
-            for k in range(size):
-                k_0 += row[k] * g_0[k]
-            line[j] += k_0
-            j += 1
+        add_row_products(row, of.gradient, i + 1, matrix[i])
 
 
 @njit(cache=True, fastmath=REORDERED)

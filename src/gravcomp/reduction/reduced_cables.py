@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from gravcomp.reduction.row_products import add_row_products
 from gravcomp.rounding import REORDERED
 
 
@@ -156,27 +157,7 @@ def add_stiffness(cables: ReducedCables, tendons: ReducedTendons, tension: np.nd
                 to[k] = u_0[k] * d_0[k] + u_1[k] * d_1[k] + u_2[k] * d_2[k]
     rows = parts.reshape(r, 2 * count)
     for i in range(r):
-        row, line, j = rows[i], matrix[i], 0
-        while j + 4 <= i + 1:  # four entries at a time: the row is read less often
-            r_0, r_1, r_2, r_3 = rows[j], rows[j + 1], rows[j + 2], rows[j + 3]
-            k_0 = k_1 = k_2 = k_3 = np.float32(0.0)
-            for k in range(2 * count):
-                x = row[k]
-                k_0 += x * r_0[k]
-                k_1 += x * r_1[k]
-                k_2 += x * r_2[k]
-                k_3 += x * r_3[k]
-            line[j] += k_0
-            line[j + 1] += k_1
-            line[j + 2] += k_2
-            line[j + 3] += k_3
-            j += 4
-        while j <= i:
-            r_0, k_0 = rows[j], np.float32(0.0)
-            for k in range(2 * count):
-                k_0 += row[k] * r_0[k]
-            line[j] += k_0
-            j += 1
+        add_row_products(rows[i], rows, i + 1, matrix[i])
 
 
 @njit(cache=True, fastmath=REORDERED)
