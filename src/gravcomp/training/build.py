@@ -40,10 +40,9 @@ class BuildOptions:
     they do not represent; strains: number of principal strains in addition to those of the modes; more_strains: more of them
     where such a robot has a law with points: its strains are large; decomposed: largest number of snapshots to decompose,
     strained: and to find the principal strains in; integrated: number of shapes to choose the cubature of the law's deviation
-    with, cubature its tolerance; up to `few_points`, which cost a step hardly any time, half of it is to be left, and from
-    `points` up to `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends
-    when the modes of earlier paths represent new ones to this part of the length; training and test: motions to train and to
-    test with.
+    with, cubature its tolerance; up to `few_points`, which cost a step hardly any time, half of it is to be left, and with
+    `board_points`, for which the board has room, twice the tolerance is enough; represented: the training ends when the modes of
+    earlier paths represent new ones to this part of the length; training and test: motions to train and to test with.
     """
 
     modes: int = 44
@@ -56,7 +55,6 @@ class BuildOptions:
     integrated: int = 150
     cubature: float = 1e-4
     few_points: int = 64
-    points: int = 120
     board_points: int = 128
     represented: float = 2e-4
     training: TrainingOptions = field(default_factory=TrainingOptions)
@@ -127,7 +125,7 @@ def trained(
         sections = section_changes(model, basis)[:, 0] / model.length
         some = evenly(len(found), options.integrated)
         compliance = compliances(model, basis, [found[number] for number in some])
-        room = options.points, options.board_points
+        room = options.board_points, options.board_points
         cubature = choose(
             model.elements, basis, coordinates[some], compliance, sections, options.cubature, room, options.few_points
         )
