@@ -459,14 +459,14 @@ def test_few_points_with_positive_weights_carry_the_deviation(modes):
     coordinates = 0.1 * np.random.default_rng(2).normal(size=(40, 3))
     sections, compliance = section_changes(model, basis)[:, 0] / model.length, np.tile(np.eye(3), (40, 1, 1))
 
-    def chosen(tolerance: float, enough: tuple[int, int], compliance: np.ndarray = compliance) -> Cubature:
-        return choose(model.elements, basis, coordinates, compliance, sections, tolerance, enough)
+    def chosen(tolerance: float, room: int, compliance: np.ndarray = compliance) -> Cubature:
+        return choose(model.elements, basis, coordinates, compliance, sections, tolerance, room)
 
-    rough, fine = (chosen(tolerance, (999, 999)) for tolerance in (1e-3, 3e-5))
+    rough, fine = (chosen(tolerance, 999) for tolerance in (1e-3, 3e-5))
     assert 0 < len(rough.weight) < len(fine.weight) < model.elements.weights.size / 2
     assert (fine.weight > 0.0).all() and fine.error <= 3e-5 < rough.error <= 1e-3
     # Where a number of points is enough, twice the error is allowed; where it is not, the error counts.
-    every_point, enough = (chosen(3e-5, (few, few)) for few in (1, len(fine.weight) - 1))
+    every_point, enough = (chosen(3e-5, few) for few in (1, len(fine.weight) - 1))
     assert every_point.error <= 3e-5 and len(enough.weight) <= len(fine.weight) and enough.error <= 6e-5
     few, largest = fine.deviation(model.elements, basis), np.abs(deviation_at(every, coordinates[0]).force).max()
     for q in 0.1 * np.random.default_rng(3).normal(size=(5, 3)):  # not chosen with these
@@ -480,7 +480,7 @@ def test_forces_that_are_in_error_where_a_shape_is_stiff_move_nothing(modes):
     sections, soft = section_changes(model, basis)[:, 0] / model.length, np.tile(np.eye(3), (40, 1, 1))
     stiff = soft @ np.diag([1.0, 1e-3, 1e-3])
     of_soft, of_stiff = (
-        choose(model.elements, basis, coordinates, compliance, sections, 3e-5, (999, 999)) for compliance in (soft, stiff)
+        choose(model.elements, basis, coordinates, compliance, sections, 3e-5, 999) for compliance in (soft, stiff)
     )
     assert len(of_stiff.weight) < 0.8 * len(of_soft.weight) and of_stiff.error <= 3e-5
 
@@ -491,7 +491,7 @@ def test_points_are_chosen_where_a_body_is_so_stiff_that_its_part_is_rounding_er
     _, _, basis, _ = modes
     coordinates, turn = 0.1 * np.random.default_rng(2).normal(size=(40, 3)), Rotation.random(40, rng=5).as_matrix()
     compliance = turn @ np.diag([1.0, 1e-20, 1e-20]) @ turn.swapaxes(1, 2)
-    chosen = choose(model.elements, basis, coordinates, compliance, section_changes(model, basis)[:, 0], 1e-3, (999, 999))
+    chosen = choose(model.elements, basis, coordinates, compliance, section_changes(model, basis)[:, 0], 1e-3, 999)
     assert len(chosen.weight) and chosen.error <= 1e-3
 
 
@@ -514,19 +514,19 @@ def test_the_compliance_of_a_sample_is_that_of_the_full_model(built):
     assert np.linalg.norm(section_changes(model, basis)[-1, 0] @ force - wanted) > 0.05 * np.linalg.norm(wanted)
 
 
-def test_twice_the_error_is_enough_at_every_number_of_points_that_the_board_has_room_for():
+def test_twice_the_error_is_enough_where_the_points_fill_the_room_of_the_board():
     columns = np.random.default_rng(4).random((30, 60))
     total = columns @ np.ones(60)
 
-    def count(*enough: int) -> tuple[int, float]:
-        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, enough)
+    def count(allowed: float, room: int) -> tuple[int, float]:
+        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, room)
         return len(index), left
 
     allowed = 0.02 * np.linalg.norm(total)
-    (most, within), (fewest, rough) = count(999, 999), count(0, 999)
+    (most, within), (fewest, rough) = count(allowed, 999), count(2.0 * allowed, 999)
     assert fewest < most and within <= allowed < rough <= 2.0 * allowed
-    # Between the smallest and the largest number; where there is room for fewer only, the error counts.
-    assert count(fewest - 1, fewest) == (fewest, rough) and count(0, fewest - 1) == (most, within)
+    # Where there is room for fewer only, the error counts.
+    assert count(allowed, fewest) == (fewest, rough) and count(allowed, fewest - 1) == (most, within)
 
 
 def test_half_of_the_error_is_left_where_few_points_do_so():
@@ -535,7 +535,7 @@ def test_half_of_the_error_is_left_where_few_points_do_so():
     allowed = 0.02 * np.linalg.norm(total)
 
     def count(few: int) -> tuple[int, float]:
-        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, (999, 999), few)
+        index, _, left = sparse_weights(columns.T @ columns, columns.T @ total, total @ total, allowed, 999, few)
         return len(index), left
 
     (fewest, rough), (most, within) = count(0), count(999)

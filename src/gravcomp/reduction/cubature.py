@@ -76,14 +76,14 @@ def choose(
     compliance: np.ndarray,
     sections: np.ndarray,
     tolerance: float,
-    enough: tuple[int, int],
+    room: int,
     few: int = 0,
 ) -> Cubature:
     """Return the cubature for a basis (3 n_free, r) and trained shapes (s, r) in its coordinates.
 
     compliance (s, r, r): K_s^-1; sections (n, 3, r): change of the observed sections by the coordinates, over the robot's length;
-    tolerance: largest `error` of the result; enough: smallest and largest number of points that are enough where they leave at
-    most twice as much; few: up to so many points, half as much is to be left.
+    tolerance: largest `error` of the result; room: so many points are enough where they leave at most twice as much; few: up to
+    so many points, half as much is to be left.
     """
     weighing = _weighing(compliance, sections)
     element, point = (index.ravel() for index in np.indices(elements.weights.shape))
@@ -100,7 +100,7 @@ def choose(
     forces = np.hstack(columns)
     root = np.sqrt(len(coordinates))
     products = forces.T @ forces, forces.T @ total, float(total @ total)
-    chosen, found, left = sparse_weights(*products, tolerance * root, enough, few)
+    chosen, found, left = sparse_weights(*products, tolerance * root, room, few)
     at = candidates[chosen]
     return Cubature(element[at], point[at], found, left / root)
 
@@ -121,12 +121,12 @@ def _weighing(compliance: np.ndarray, sections: np.ndarray) -> np.ndarray:
 
 
 def sparse_weights(
-    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, enough: tuple[int, int], few: int = 0
+    gram: np.ndarray, products: np.ndarray, square: float, allowed: float, room: int, few: int = 0
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """Return indices (p,), positive weights (p,) and remaining |A w - b| of few columns of A for which it is at most `allowed`.
 
-    gram A^T A (c, c); products A^T b (c,); square b^T b; enough: smallest and largest number of columns that are enough where
-    they leave at most twice as much; few: up to so many columns, half as much is to be left.
+    gram A^T A (c, c); products A^T b (c,); square b^T b; room: so many columns are enough where they leave at most twice as
+    much; few: up to so many columns, half as much is to be left.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
     active = _ActiveSet(gram / np.outer(scale, scale), products / scale)
@@ -135,7 +135,7 @@ def sparse_weights(
         wanted = allowed if active.count >= few else 0.5 * allowed
         if left <= max(wanted, 1e-7 * np.sqrt(square)):
             break
-        if enough[0] <= active.count <= enough[1] and left <= 2.0 * allowed:
+        if active.count == room and left <= 2.0 * allowed:
             break
         gain = active.gain()
         best = int(np.argmax(gain))

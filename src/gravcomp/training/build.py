@@ -125,10 +125,8 @@ def trained(
         sections = section_changes(model, basis)[:, 0] / model.length
         some = evenly(len(found), options.integrated)
         compliance = compliances(model, basis, [found[number] for number in some])
-        room = options.board_points, options.board_points
-        cubature = choose(
-            model.elements, basis, coordinates[some], compliance, sections, options.cubature, room, options.few_points
-        )
+        room, few_points = options.board_points, options.few_points
+        cubature = choose(model.elements, basis, coordinates[some], compliance, sections, options.cubature, room, few_points)
     whole = Reduction(
         basis=basis,
         elasticity=elasticity,
