@@ -1,6 +1,8 @@
 """The reduced model: exact polynomials, agreement with the full model, trained range, and fallback to the full model."""
 
 import dataclasses
+import pickle
+import subprocess
 import sys
 
 import numpy as np
@@ -228,6 +230,39 @@ def test_the_error_is_measured_after_a_step_as_in_it(built, asked):
                 within.step(gravity, duration=0.01)
                 error = within._serving._error = after._serving._error
     assert measured >= 2 and within._serving.trusted
+
+
+_LOADED_IN_THE_LOOP = """
+import pickle, sys
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from gravcomp.simulation import DynamicSimulator, Simulator
+
+def loaded():
+    modules = [module for name, module in sys.modules.items() if name.startswith("gravcomp")]
+    found = [(m.__name__, name, f) for m in modules for name, f in vars(m).items() if isinstance(f, Dispatcher)]
+    return {(module, name): len(f.overloads) for module, name, f in found}
+
+robot = pickle.load(sys.stdin.buffer)
+for kind, more in (Simulator, {"later": True}), (DynamicSimulator, {}):
+    simulator = kind(robot)
+    simulator.warm_up()
+    simulator.reset()
+    models, before = set(), loaded()
+    for gravity in [9.81] * 40 + [60.0]:
+        models.add(simulator.step(np.array([-gravity, 0.0, 0.0]), np.zeros(len(robot.cables)), duration=0.01, **more).model)
+        getattr(simulator, "measure_error", bool)()
+    assert models == {"reduced", "full"}, models
+    after = loaded()
+    print(kind.__name__, *(name for name in after if after[name] > before.get(name, 0)))
+"""
+
+
+def test_no_compiled_function_is_loaded_after_the_warm_up(built):
+    """Neither for the first measured error nor where the full model takes over: loading takes as long as several samples."""
+    robot = pickle.dumps(built[0].robot)
+    done = subprocess.run([sys.executable, "-c", _LOADED_IN_THE_LOOP], input=robot, capture_output=True, check=False)
+    assert done.stdout.decode().split() == ["Simulator", "DynamicSimulator"], done.stderr.decode()
 
 
 @pytest.mark.parametrize("later", [False, True])

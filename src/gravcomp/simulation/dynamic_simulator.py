@@ -99,9 +99,20 @@ class DynamicSimulator:
     def warm_up(self) -> None:
         """As `Simulator.warm_up`, with the motion; afterwards the robot is straight and at rest."""
         self.statics.warm_up()
+        reduced, self._reduced = self._reduced, None
+        try:
+            self._release_and_hold()  # with the full model, which takes over where the reduced one ends
+        finally:
+            self._reduced = reduced
+        if reduced is not None:
+            self.reset()
+            self._release_and_hold()
+        self.reset()
+
+    def _release_and_hold(self) -> None:
+        """Step with cables that are released and with slack ones."""
         for displacement in (None, np.zeros(self.model.tendons.count)):
             self.step(np.zeros(3), displacement)
-        self.reset()
 
     def reset(self) -> None:
         """Return to the straight robot at rest, without gravity."""

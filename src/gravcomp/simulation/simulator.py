@@ -109,13 +109,24 @@ class Simulator:
         """
         if self.solver.contact is not None and self.solver.contact.own is not None:
             self.solver.contact.own.warm_up()
+        self._pull_and_release()
+        if self._serving:
+            # The full model measures the reduced one's error and takes over from it: its first step must not stop the loop.
+            serving, self._serving = self._serving, None
+            try:
+                self._pull_and_release()
+            finally:
+                self._serving = serving
+        self.reset()
+
+    def _pull_and_release(self) -> None:
+        """Step with cables that are released, slack, pulled in and paid out again."""
         slack = np.zeros(self.model.tendons.count)
         for displacement in (None, slack, slack + _SMALL_PULL * self.model.length, slack):
             shape = self.step(np.zeros(3), displacement, duration=_SHORT_STEP)
             if shape.cable_tension.any():
                 with contextlib.suppress(NotPositiveDefinite, MeshError):  # a body without a section at its end has none
                     self.solver.tip_compliance()  # a step keeps its tangent while the shape hardly changes; this assembles it
-        self.reset()
 
     def step(
         self,
