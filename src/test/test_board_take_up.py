@@ -50,14 +50,15 @@ class TakeUpOnBoard:
 
 
 def commanded(seed: int) -> np.ndarray:
-    """Targets (t,) in m: jumps, ramps and rests of 0.1 to 1 s, with a tremble."""
+    """Targets (t,) in m: jumps, ramps and rests of 0.1 to 1 s, with a tremble, and noise that leads some out of their band."""
     random, parts, last = np.random.default_rng(seed), [], 0.0
     for _ in range(24):
         after = float(random.choice([random.uniform(-1e-3, 1e-3), last + random.uniform(-4e-5, 4e-5)]))
         parts += [np.linspace(last, after, int(random.integers(1, 60))), np.full(int(random.integers(50, 500)), after)]
         last = after
     targets = np.concatenate(parts)
-    return targets + random.uniform(-2e-6, 2e-6, len(targets))
+    out_of_band = np.where(random.random(len(targets)) < 0.01, random.choice([-1.4, 1.4], len(targets)) * 0.2 * PLAY, 0.0)
+    return targets + out_of_band + random.uniform(-2e-6, 2e-6, len(targets))
 
 
 @pytest.mark.parametrize(

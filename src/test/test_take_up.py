@@ -178,6 +178,19 @@ def times_taken_up(target, duration: float, **drive) -> int:
     return times
 
 
+@pytest.mark.parametrize("size", [1.1, 1.9])
+@pytest.mark.parametrize("samples", [1, 3])
+def test_a_target_that_noise_moves_out_of_its_band_for_some_samples_is_taken_up_once(size, samples):
+    band, random = 0.2 * math.radians(0.6) * 0.005, np.random.default_rng(3)
+    count = 2500 // samples + 1
+    noise = np.repeat((random.random(count) < 0.03) * random.choice([-size, size], count), samples) * band
+
+    def trembles(time: float) -> float:  # the IMU gives a sample every 10 ms
+        return 7e-4 + float(noise[int(100 * time)]) if time > 1.0 else 1e-3
+
+    assert times_taken_up(trembles, 24.0) == 1
+
+
 @pytest.mark.parametrize("rate", [0.03e-3, 0.01e-3, 0.005e-3])
 def test_a_target_that_creeps_is_not_at_rest_until_it_stops(rate):
     def crept(time: float) -> float:

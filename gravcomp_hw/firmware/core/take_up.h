@@ -13,18 +13,26 @@
 
 typedef enum { GC_TAKEN_UP, GC_TAKE_UP_OUT, GC_TAKE_UP_IN } gc_take_up_phase;
 
+// A target that stays in a band.
+typedef struct {
+  float target;  // m, in the middle of the band
+  float rest;    // s after which it is at rest: longer where it creeps
+  float since;   // s for which it stays
+  bool done;     // the motor has gone out for it
+  gc_take_up_phase phase;
+} gc_stay;
+
 // Zeros: the gear is on the flank that winds in, as homing leaves it, and no target is known.
 typedef struct {
-  bool started;  // last and kept are known
+  bool started;  // last and stay are known
   float last;    // m, displacement of the rotor
   float loose;   // m, by which the gear may be loose
-  float kept;    // m, target that stays
-  float since;   // s for which it stays
-  float rest;    // s after which it is at rest: longer where it creeps
-  bool done;     // the motor has gone out for it
-  bool waits;    // for the other motors of the robot
-  bool joins;    // one of them begins
-  gc_take_up_phase phase;
+  gc_stay stay;
+  bool may_come_back;  // the target, to `left`
+  gc_stay left;
+  float away;  // s for which it has left
+  bool waits;  // for the other motors of the robot
+  bool joins;  // one of them begins
 } gc_take_up;
 
 // Where a motor goes now on its way to its target.
