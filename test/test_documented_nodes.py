@@ -35,8 +35,12 @@ def demonstrated(folder):
     option = documented("./gravcomp demo --screenshots src/doc/pictures")[2]
     pictures = folder / "shown"  # the documented folder leads to the repository's pictures
     more = [option, str(pictures)] if find_chromium() else []
-    shell = Shell([*words, *more, "--duration", "12", "--json"], folder, dict(os.environ))
-    return *shell.end(600.0), pictures
+    for _ in range(2):
+        code, output = Shell([*words, *more, "--duration", "12", "--json"], folder, dict(os.environ)).end(600.0)
+        if code != 2:
+            break
+        # The bridge stops the motors where a busy machine loses their feedback, which is code 2; a defect gives it twice.
+    return code, output, pictures
 
 
 @pytest.mark.rates

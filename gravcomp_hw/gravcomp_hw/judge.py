@@ -32,7 +32,7 @@ from gravcomp.graph.parameters.judge import JudgeParameters
 from gravcomp.inverse import Holdable
 from gravcomp.mesh.robot_axis import rest_tip
 from gravcomp.whole_file import write_whole
-from gravcomp_msgs.msg import CableCommand, ControllerStatus, Deformation
+from gravcomp_msgs.msg import CableCommand, CableState, ControllerStatus, Deformation
 from gravcomp_node import LATCHED, SENSOR, ManagedNode, run
 
 # Messages that the middleware keeps between two reads, which are 0.1 s apart.
@@ -73,6 +73,8 @@ class Judge(ManagedNode):
         ]
         self._status = Polled(self, ControllerStatus, "controller/status", LATCHED)
         self._deformation = Polled(self, Deformation, "robot/deformation", SENSOR)
+        self._cables = Polled(self, CableState, "cable/state", SENSOR)
+        self._fault: str | None = None  # why the bridge drives no motor
         self._unholdable: str | None = None
         self._relax = RepeatedCall(self.create_client(Trigger, "inverse_controller/relax"), Trigger.Request())
         self._enable = RepeatedCall(self.create_client(SetBool, "inverse_controller/enable"), SetBool.Request(data=True))
@@ -124,11 +126,13 @@ class Judge(ManagedNode):
         return True
 
     def _check_compensated(self) -> None:
-        """Raise ConfigError at the end of a run in which compensation has not begun: its figures would be those of the sag."""
+        """Raise ConfigError at the end of a run without compensation: its figures would be those of the sag."""
         if self._compensated_at is None and self.parameters.duration > self.parameters.relax_time:
             call = (self._stop or self._enable) if self._released else self._relax
             answer = f"the answer is '{call.refusal}'" if call.refusal else "the service has not answered"
             raise ConfigError(f"compensation has not begun: {call.service}: {answer}")
+        if self._fault is not None:
+            raise ConfigError(f"compensation has ended: the bridge drives no motor: {self._fault}")
 
     def _observe(self) -> None:
         """Query the lifecycle states and write the state of the run to the result file."""
@@ -156,6 +160,9 @@ class Judge(ManagedNode):
         status = self._status.take()
         if status is not None and status.message.holdable:
             self._unholdable = status.message.hold_message if status.message.holdable == Holdable.NO else None
+        cables = self._cables.take()
+        if cables is not None:
+            self._fault = cables.message.message if cables.message.state == CableState.FAULT else None
         if self._begin is None and len(self._truth_tip):
             self._begin = self._now()
 

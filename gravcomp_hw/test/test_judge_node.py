@@ -13,6 +13,7 @@ from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool, Trigger
 
 from gravcomp.config import ConfigError
+from gravcomp_msgs.msg import CableState
 from gravcomp_node import SENSOR
 
 SHORTEST = ("duration:=5.0", "measure_delay:=false")
@@ -29,6 +30,8 @@ class Graph:
         self.peer.create_service(SetBool, "inverse_controller/enable", lambda _, answer: self.answer("enable", answer))
         self.peer.create_service(Trigger, "inverse_controller/relax", lambda _, answer: self.answer("relax", answer))
         self.truth = self.peer.create_publisher(PoseStamped, "truth/tip", SENSOR)
+        self.cables = self.peer.create_publisher(CableState, "cable/state", SENSOR)
+        self.bridge = CableState(state=CableState.ACTIVE)
         self.peer.create_timer(0.02, self.rest)
         self.executor.add_node(self.judge)
         self.peers = SingleThreadedExecutor()
@@ -54,6 +57,7 @@ class Graph:
         message = PoseStamped()
         message.header.stamp = self.peer.get_clock().now().to_msg()
         self.truth.publish(message)
+        self.cables.publish(self.bridge)
 
     def run(self, until, busy=lambda: False):
         """Spin both until the condition is met; the peer's services and its motion only while it is not busy."""
@@ -90,3 +94,19 @@ def test_a_run_without_compensation_has_no_figures():
         graph.answers["enable"] = False
         with pytest.raises(ConfigError, match=r"compensation has not begun: .*_controller/enable: the answer is 'not now'"):
             graph.run(lambda: graph.judge._phase == "done")
+
+
+def test_a_run_whose_bridge_ends_in_a_fault_has_no_figures():
+    with Graph("relax_time:=0.5") as graph:
+        graph.run(lambda: graph.judge._phase == "compensating")
+        graph.bridge = CableState(state=CableState.FAULT, message="motor 1 is stalled")
+        with pytest.raises(ConfigError, match="compensation has ended: the bridge drives no motor: motor 1 is stalled"):
+            graph.run(lambda: graph.judge._phase == "done")
+
+
+def test_a_fault_that_is_over_leaves_the_figures():
+    with Graph("relax_time:=0.5") as graph:
+        graph.bridge = CableState(state=CableState.FAULT, message="no motor answers")
+        graph.run(lambda: graph.judge._phase == "compensating")
+        graph.bridge = CableState(state=CableState.ACTIVE)
+        graph.run(lambda: graph.judge._phase == "done")

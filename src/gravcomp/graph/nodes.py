@@ -173,6 +173,7 @@ NODES = (
             Port("gravity", "geometry_msgs/msg/Vector3Stamped", "estimated gravity, m/s^2"),
             Port("imu/data_raw", "sensor_msgs/msg/Imu", "its rate is measured"),
             Port("cable/command", "gravcomp_msgs/msg/CableCommand", "its rate is measured"),
+            Port("cable/state", "gravcomp_msgs/msg/CableState", "whether the bridge has a fault at the end"),
             Port("controller/status", "gravcomp_msgs/msg/ControllerStatus", "whether the target can be held"),
         ),
         publishes=(_DIAGNOSTICS,),
