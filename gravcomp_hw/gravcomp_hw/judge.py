@@ -131,7 +131,7 @@ class Judge(ManagedNode):
             call = (self._stop or self._enable) if self._released else self._relax
             answer = f"the answer is '{call.refusal}'" if call.refusal else "the service has not answered"
             raise ConfigError(f"compensation has not begun: {call.service}: {answer}")
-        if self._fault is not None:
+        if self._fault is not None and not self.parameters.standalone:  # there the board drives them
             raise ConfigError(f"compensation has ended: the bridge drives no motor: {self._fault}")
 
     def _observe(self) -> None:
