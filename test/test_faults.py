@@ -53,14 +53,21 @@ def test_a_killed_process_can_be_started_again(campaign, executable):
 
 def test_a_killed_bridge_starts_again_with_its_zero_positions(campaign):
     """Without current the robot sags and pulls its cables out; a bridge without zero positions would take that place as zero."""
-    # Without commands the bridge continues to hold, so the probe finds that state even if it discovers the new node late.
-    asked = time.time()  # the bridge can hold before the service has answered
-    campaign.probe.enable(False)
-    assert campaign.probe.wait_for({State.HOLDING}, asked, 10.0)
-    killed = time.time()
-    campaign.graph.process("can_bridge").send_signal(signal.SIGKILL)
-    campaign.graph.restart("can_bridge")
-    seen = campaign.probe.wait_for({State.HOLDING}, killed, 30.0)
+    for _ in range(2):
+        # Without commands the bridge continues to hold, so the probe finds that state even if it discovers the new node late.
+        asked = time.time()  # the bridge can hold before the service has answered
+        campaign.probe.enable(False)
+        assert campaign.probe.wait_for({State.HOLDING}, asked, 10.0)
+        killed = time.time()
+        campaign.graph.process("can_bridge").send_signal(signal.SIGKILL)
+        campaign.graph.restart("can_bridge")
+        seen = campaign.probe.wait_for({State.HOLDING}, killed, 30.0)
+        if seen:
+            break
+        # A guard that a busy machine has stopped while the cables ran out has lost count, and says so; a defect does it twice.
+        assert "could not be counted" in campaign.probe.states[-1].message
+        campaign.clear_faults()
+        assert campaign.make_active()
     assert seen, [state for state in campaign.probe.states if state.time >= killed]
     time.sleep(0.05)
     assert np.abs(campaign.probe.displacement()).max() > 0.3e-3
