@@ -217,6 +217,7 @@ class Judge(ManagedNode):
         last = self._truth_tip.values[-1] if len(self._truth_tip) else None
         state = {
             "phase": self._phase,
+            "time": self._now(),
             "elapsed": 0.0 if self._begin is None else self._now() - self._begin,
             "tip_error_mm": None if last is None else _mm(float(np.linalg.norm(last - self._target))),
             "nodes": self._states,

@@ -258,7 +258,8 @@ def _follow(
                 phase = state["phase"]
                 progress.console.print(f"{state['elapsed']:5.1f} s  {phase}")
             if pictures:
-                pictures.follow(state.get("elapsed", 0.0), time.monotonic())
+                age = time.time() - state.get("time", time.time())  # the state may have been written half a second ago
+                pictures.follow(state.get("elapsed", 0.0), time.monotonic() - age)
             error = state.get("tip_error_mm")
             note = "" if error is None else f"tip error {error:5.1f} mm"
             progress.update(task, description=phase, completed=state.get("elapsed", 0.0), note=note)

@@ -29,7 +29,7 @@ class PagePictures:
         """Record the moments that are reached: `elapsed` s of the run at the time `now` (s, monotonic)."""
         for name, moment in self._due.items():
             if name not in self._times and elapsed >= moment:
-                self._times[name] = now
+                self._times[name] = now - (elapsed - moment)
 
     def take(self, address: str) -> str:
         """Write NAME.png for each recorded moment. Returns the error as text, or ''."""
