@@ -13,7 +13,7 @@
 
 void gc_take_up_reset(gc_take_up *take_up) { gc_zero(take_up, sizeof *take_up); }
 
-// Observe in which band, half as wide as `least`, the target stays now.
+// Observe in which band the target stays now: up to `least` from its middle.
 static void stay(gc_take_up *take_up, float target, float least, float rest_time, float dt) {
   gc_stay *const last = &take_up->stay, *const left = &take_up->left;
   if (!take_up->started) {

@@ -6,8 +6,8 @@ import sys
 from collections.abc import Callable
 from types import FrameType
 
-_LATER = 0.02  # s
-_IMPORT = "<frozen importlib._bootstrap>"
+_LATER = 0.02  # s, until an interrupt that an import has put off comes again
+_IMPORT = "<frozen importlib._bootstrap>"  # file name of the code that imports
 
 
 def run_interruptible(work: Callable[[], int]) -> None:
