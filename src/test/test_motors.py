@@ -10,7 +10,7 @@ import pytest
 from gravcomp.canbus import codec
 from gravcomp.config import ConfigError
 from gravcomp.description.hardware import COUNTS_PER_TURN, Drive, Watchdog, parse_hardware
-from gravcomp.motors.encoder import JUMPS, SETTLING_TIME, Encoder
+from gravcomp.motors.encoder import JUMPS, SETTLING_TIME, Encoder, stays_countable
 from gravcomp.motors.homing import find_knee
 from gravcomp.motors.loop import PositionLoop
 from gravcomp.motors.monitor import MotorMonitor
@@ -125,6 +125,33 @@ def test_lost_frames_lose_no_turn_silently(rpm, gap, start):
         if not 0.5 <= 0.002 * k < 0.5 + gap:
             encoder.update(int(count) % COUNTS_PER_TURN, rpm, 0.0, 0.002 * k)
     assert not encoder.certain or encoder.count == int(count)
+
+
+def after_silence(rpm, silence, late):
+    """Return whether the count is certain and right after a silence: the rotor stood meanwhile, or its frames come late."""
+    encoder, now, turned = Encoder(), 0.0, 0.0
+    for k in range(300):
+        if k == 100 and not late:
+            now += silence
+        turned = rpm / RPM * 0.008 * k
+        arrival = now + 0.008 * k
+        if late and 0.8 <= arrival < 0.8 + silence:
+            arrival = 0.8 + silence + 0.001 * (k - 100)  # one in a millisecond, until the last late one has come
+        encoder.update(int(turned) % COUNTS_PER_TURN, rpm, 0.0, arrival)
+    return encoder.certain and encoder.count == int(turned)
+
+
+@pytest.mark.parametrize("rpm", [0, 20, 100, 200, 500, 1500])
+@pytest.mark.parametrize("silence", [0.02, 0.06, 0.1, 0.12, 0.3])
+def test_a_rotor_that_stands_in_a_silence_keeps_its_turns_where_this_is_said(rpm, silence):
+    if stays_countable(rpm, silence):
+        assert after_silence(rpm, silence, late=False)
+
+
+def test_a_fast_rotor_keeps_its_turns_only_where_its_frames_come_late():
+    assert not stays_countable(1500, 0.15) and stays_countable(100, 0.1) and stays_countable(0, 3.0)
+    assert not after_silence(1500, 0.15, late=False) and after_silence(1500, 0.15, late=True)
+    assert after_silence(1500, 0.3, late=True)
 
 
 def test_a_rotor_that_was_turned_by_hand_without_feedback_has_uncertain_turns():

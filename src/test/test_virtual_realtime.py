@@ -1,6 +1,7 @@
 """The virtual robot on a bus, in real time."""
 
 import threading
+from types import SimpleNamespace
 
 import can
 import pytest
@@ -8,6 +9,8 @@ from virtual_article import article, virtual_robot
 
 from gravcomp.canbus.bus import BusError
 from gravcomp.canbus.codec import decode, encode
+from gravcomp.motors.encoder import stays_countable
+from gravcomp.virtual import realtime
 from gravcomp.virtual.realtime import RealtimeRobot
 
 
@@ -27,6 +30,54 @@ class Truths:
         with self._arrived:
             self.last = None
             assert self._arrived.wait_for(lambda: self.last is not None and condition(self.last), timeout=20.0)
+
+
+class Clock:
+    """Stands in for the module `time`: it advances by what is slept, and once by a pause of the machine."""
+
+    def __init__(self, pause):
+        self.now, self.slept, self.pause = 0.0, 0, pause
+
+    def monotonic(self):
+        return self.now
+
+    def sleep(self, duration):
+        self.slept += 1
+        self.now += duration + (self.pause if self.slept == 10 else 0.0)
+
+
+class Turning:
+    """Stands in for a robot whose motors turn at a speed; it stops the loop after so many steps."""
+
+    def __init__(self, speed, live, steps):
+        self.speed, self.live, self.steps, self.skipped = speed, live, steps, []
+
+    def keeps_turns(self, duration):
+        return stays_countable(self.speed, duration)
+
+    def skip(self, duration):
+        self.skipped.append(duration)
+        return duration
+
+    def step(self, period, frames):
+        self.steps -= 1
+        if self.steps == 0:
+            self.live._stop.set()
+        return []
+
+
+@pytest.mark.parametrize(("speed", "pause", "skips"), [(0.0, 0.3, 1), (1500.0, 0.3, 0), (1500.0, 0.7, 1), (1500.0, 0.05, 0)])
+def test_a_pause_is_skipped_where_no_turn_of_a_motor_is_lost_and_caught_up_else(monkeypatch, speed, pause, skips):
+    """Unless it is so long that samples would be late for too long."""
+    live = RealtimeRobot(virtual_robot(), on("virtual", "pause"), lambda truth: None, truth_rate=0.1)
+    clock = Clock(pause)
+    live.robot = robot = Turning(speed, live, steps=500)
+    live.link = SimpleNamespace(receive=lambda timeout: [], send=lambda frames: True)
+    monkeypatch.setattr(realtime, "time", clock)
+    live._loop()
+    assert len(robot.skipped) == skips
+    # Virtual time follows the clock: what was not skipped was computed.
+    assert clock.now == pytest.approx(500 * live._period + live.lost_time, abs=2.0 * live._period)
 
 
 def on(interface, channel):

@@ -13,9 +13,12 @@ from gravcomp.launcher import Graph
 from gravcomp.launcher.host_client import NodeHost
 from gravcomp.launcher.page_address import wait_for_page
 from gravcomp.launcher.robot_graph import LOOP, RobotGraph
+from gravcomp.motors.state import RECOVERY, State
 
 NODES = ("virtual_robot", *(executable for _, executable in LOOP))
 """Executables of the nodes."""
+
+_STATES = {state.name.lower() for state in State}
 
 START_TIMEOUT = 300.0
 """s; on the first start on a machine Numba compiles."""
@@ -69,8 +72,16 @@ class RunningGraph:
         """Return the process of a node."""
         return psutil.Process(self._graph.processes[self._specs[executable].name].pid)
 
+    def latched_fault(self) -> str:
+        """Return the fault in which the bridge waits for a user, as it has logged it; empty: there is none."""
+        log = self._graph.processes[self._specs["can_bridge"].name].log.read_text(encoding="utf-8")
+        return last_latched_fault(log)
+
     def wait_for_commands(self, timeout: float = START_TIMEOUT) -> float:
-        """Wait until currents on the bus follow commands. Returns the time in s. Raises TimeoutError, NodeDied."""
+        """Wait until currents on the bus follow commands. Returns the time in s.
+
+        Raises TimeoutError, at once where the bridge waits in a fault, NodeDied.
+        """
         begin = time.monotonic()
         link = CanLink(self.can, [codec.layout("CommandTrace").frame_id])
         link.open()
@@ -79,6 +90,19 @@ class RunningGraph:
                 if link.receive(0.1):
                     return time.monotonic() - begin
                 self.check()
+                if fault := self.latched_fault():
+                    raise TimeoutError(f"no command reaches the motors: the bridge has stopped them: {fault}")
         finally:
             link.close()
         raise TimeoutError(f"no command reached the motors within {timeout:.0f} s; the nodes' output is in {self._graph.logs}")
+
+
+def last_latched_fault(log: str) -> str:
+    """Return the fault at the end of a log of the bridge, without what a user can do; empty where it has left it since."""
+    for line in reversed(log.splitlines()):
+        state, _, message = line.rpartition("]: ")[2].partition(": ")
+        if state == "fault":
+            return message.partition(RECOVERY)[0] if RECOVERY in message else ""
+        if state in _STATES:
+            return ""
+    return ""

@@ -23,7 +23,7 @@ from gravcomp.motors.fault_watch import FaultWatch
 from gravcomp.motors.homing import HomingProcedure, Phase
 from gravcomp.motors.output import BusOutputs
 from gravcomp.motors.rotors import Rotors
-from gravcomp.motors.state import DRIVING, CableSnapshot, State, ZeroRecord
+from gravcomp.motors.state import DRIVING, RECOVERY, CableSnapshot, State, ZeroRecord
 from gravcomp.motors.supervisor import Supervisor
 
 ZERO_POLICIES = ("start", "home", "home_at_start")
@@ -33,7 +33,6 @@ _SHARED = (
     "no homing: motors that move several cables cannot find a zero position by tightening; hold the robot straight with all its"
     " cables just taut and start with zero: start"
 )
-_RECOVERY = "; call ~/resume or ~/home to continue"
 
 
 class Bridge(Supervisor):
@@ -59,7 +58,7 @@ class Bridge(Supervisor):
             self._loops,
             require_imu=require_imu,
             idle="no current",
-            recovery=_RECOVERY,
+            recovery=RECOVERY,
         )
         self.rejected_frames = 0
         self.report = ""
@@ -229,7 +228,7 @@ class Bridge(Supervisor):
             return
         uncertain = self._faults.uncertain_turns()
         if uncertain:
-            self._fault(f"{self.message.removesuffix(_RECOVERY)}; {uncertain}" if self._latched else uncertain, latched=True)
+            self._fault(f"{self.message.removesuffix(RECOVERY)}; {uncertain}" if self._latched else uncertain, latched=True)
             self._turns_reported = True
 
     def _begin(self, now: float) -> None:

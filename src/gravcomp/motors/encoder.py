@@ -51,6 +51,16 @@ def countable_speed(interval: float) -> float:
     return room / ((interval + _TIME_UNCERTAINTY) * _COUNTS_PER_S)
 
 
+def stays_countable(speed: float, silence: float) -> bool:
+    """Return whether a rotor that turns at `speed` (rpm) before and after a silence (s) of its feedback keeps its count of turns.
+
+    It does at rest, and where a whole turn more takes longer than the silence.
+    """
+    if abs(speed) < _REST_SPEED:
+        return True
+    return _least_time(COUNTS_PER_TURN, 0.0, abs(speed) * _COUNTS_PER_S, _TOLERANCE) > silence + _TIME_UNCERTAINTY
+
+
 @dataclasses.dataclass
 class _Doubt:
     """An undecided number of turns."""

@@ -19,6 +19,9 @@ class State(enum.IntEnum):
 DRIVING = frozenset({State.HOMING, State.ACTIVE, State.HOLDING})
 """States in which the motors get current."""
 
+RECOVERY = "; call ~/resume or ~/home to continue"
+"""End of the message of a fault that is latched: the bridge stays in it until a user acts."""
+
 
 @dataclasses.dataclass(frozen=True)
 class CableSnapshot:

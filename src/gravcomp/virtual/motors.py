@@ -50,6 +50,11 @@ class MotorBank:
         """Length (m,) m of cable wound in; 0: the cable has exactly the length of its path in the unloaded robot."""
         return self._matrix @ (self._capstan * self._true.capstan_radius) - self._longer
 
+    @property
+    def rotor_speed(self) -> np.ndarray:
+        """Speeds (k,) rpm of the rotors."""
+        return self._speed * (60.0 / (2.0 * math.pi))
+
     def step(self, ticks: int, shortened: np.ndarray, spring: np.ndarray) -> None:
         """Advance by `ticks` of TICK s; cables are springs of `spring` (m,) N/m, slack up to displacements `shortened` (m,) m."""
         true, p = self._true, self._true.common

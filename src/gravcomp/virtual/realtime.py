@@ -2,7 +2,8 @@
 
 A thread receives the frames that have arrived, steps the robot and sends its frames, once every period. After a pause of the
 machine it catches up, but not faster than a wire of 1 Mbit/s carries the frames. A lag above `_LONGEST_LAG` is skipped: frames
-are lost (counted in `lost_time`), but virtual time follows the clock, so rates and stamps stay consistent.
+are lost (counted in `lost_time`), but virtual time follows the clock, so rates and stamps stay consistent. While a motor turns so
+fast that the bridge would lose count of its turns, which is a fault, the robot goes on to catch up, up to `_LONGEST_TURNING`.
 """
 
 import copy
@@ -25,6 +26,7 @@ _SHORTEST_PERIOD, _LONGEST_PERIOD = 0.002, 0.004  # s, between two steps; in bet
 _FRAME_TIME = 0.11e-3  # s, one frame on a wire of 1 Mbit/s
 _BURST = 0.02  # s of frames sent together after a pause; receivers' socket buffers hold about 30 ms
 _LONGEST_LAG = 0.1  # s
+_LONGEST_TURNING = 0.5  # s; motors run fast for as long as the robot straightens
 _STEER_PERIOD = 0.01  # s
 
 RECEIVED_FRAMES = (*c610.COMMANDS, "HeaterCommand", "BoardRequest")
@@ -84,15 +86,19 @@ class RealtimeRobot:
         except Exception as error:  # the node reports it; a thread that ends silently would look like a dead bus
             self.error = error
 
+    def _skip(self, lag: float) -> float:
+        """Skip a lag (s) where that loses no turn of a motor, or where it is too long. Return how much was skipped (s)."""
+        with self.lock:
+            return self.robot.skip(lag) if lag > _LONGEST_TURNING or self.robot.keeps_turns(lag) else 0.0
+
     def _loop(self) -> None:
         deadline = wire_free = time.monotonic()
         count = 0
         while not self._stop.is_set():
             now = time.monotonic()
             deadline += self._period
-            if now - deadline > _LONGEST_LAG:
-                with self.lock:
-                    skipped = self.robot.skip(now - deadline)
+            if (lag := now - deadline) > _LONGEST_LAG:
+                skipped = self._skip(lag)
                 self.lost_time += skipped
                 deadline += skipped
             # Frames that arrive meanwhile wait in the socket; they take effect with this step.

@@ -20,6 +20,7 @@ from gravcomp.config import ConfigError
 from gravcomp.description import Robot
 from gravcomp.description.hardware import Hardware
 from gravcomp.firmware.host_board import HostBoard
+from gravcomp.motors.encoder import stays_countable
 from gravcomp.scene.scene import Scene
 from gravcomp.standard_gravity import STANDARD_GRAVITY
 from gravcomp.virtual.active_faults import ActiveFaults
@@ -186,6 +187,10 @@ class VirtualRobot:
                 self._apply_faults()
             sent += self._outward.through(self._act(), self.time, self._faults.of_frames)
         return sent
+
+    def keeps_turns(self, duration: float) -> bool:
+        """Return whether a host can still count the turns of all motors, as they turn, after `duration` s without frames."""
+        return all(stays_countable(speed, duration) for speed in self._motors.rotor_speed.tolist())
 
     def skip(self, duration: float) -> float:
         """Let time pass without computing it, in whole sample periods of the IMU, and return how much passed (s).
