@@ -2,16 +2,17 @@
 
 With its own domain, a test does not hear the nodes of a test that runs at the same time.
 
-Marks of the tests that start a graph of nodes, which is slow where others take its processors:
+Marks of the tests that start a graph of nodes, which is slow where others take its processors, or single nodes:
 
     graph    it waits for events: another such test may run next to it where there are processors for two graphs
-    rates    it asserts rates or delays: no other graph runs meanwhile
+    rates    it asserts rates or delays: no other test with these two marks runs meanwhile
+    nodes    its nodes take little of a processor, as no virtual robot drives them: it runs next to a graph
 
 The mark `slow` leaves a test in src/test out of `./gravcomp test --fast`, as it is no unit test of the core (CONTRIBUTING.md).
 
 All tests with the mark `rates` run in one process, one after the other. They begin first; next to them run tests without a graph,
 those that take longest first. With fewer than four processors the tests with the mark `graph` follow in the same process. A test
-of the commands in test/ without a mark starts no graph that goes on.
+of the commands in test/ without a mark starts no graph, or one for seconds only.
 """
 
 import contextlib
@@ -31,6 +32,7 @@ for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 _COMMANDS = Path(__file__).parent / "test"
 _SHARING = {"rates": fcntl.LOCK_EX, "graph": fcntl.LOCK_SH}
+_MARKS = (*_SHARING, "nodes")
 # A graph takes up to 0.9 of a processor: next to the other tests two of them starve on two.
 _ONE_GRAPH = (os.cpu_count() or 1) < 4
 # Modules that begin first among their kind, in this order: those that take longest. pytest-xdist gives a process that has at most
@@ -70,6 +72,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Declare the marks, and reserve the domain for the processes that this one starts; a domain that the user has set stays."""
     config.addinivalue_line("markers", "graph: starts nodes; may run next to another graph")
     config.addinivalue_line("markers", "rates: asserts rates or delays of a graph; no other graph runs meanwhile")
+    config.addinivalue_line("markers", "nodes: starts nodes that take little of a processor; runs next to a graph")
     config.addinivalue_line("markers", "slow: no unit test of the core; left out of ./gravcomp test --fast")
     if config.pluginmanager.has_plugin("dsession"):  # the controlling process of pytest-xdist, which runs no test
         handle, name = tempfile.mkstemp(prefix="gravcomp-tests-")
@@ -147,14 +150,14 @@ def _own_output():
 
 
 def _mark(item: pytest.Item) -> str:
-    """Return 'rates', 'graph' or ''; a mark of the test goes before that of its module."""
-    return next((mark.name for mark in item.iter_markers() if mark.name in _SHARING), "")
+    """Return 'rates', 'graph', 'nodes' or ''; a mark of the test goes before that of its module."""
+    return next((mark.name for mark in item.iter_markers() if mark.name in _MARKS), "")
 
 
 def _group(item: pytest.Item) -> str:
     """Return the name of the tests that run in one process, one after the other: those of a module, which share its fixtures."""
     mark = _mark(item)
-    alone = mark == "rates" or (mark and _ONE_GRAPH)
+    alone = mark == "rates" or (mark == "graph" and _ONE_GRAPH)
     return "rates" if alone else f"{item.path.stem}-{mark}".strip("-")
 
 
@@ -167,11 +170,12 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put what takes longest first, so that no process is idle at the end; otherwise keep the order of pytest-randomly.
 
-    Rates; commands without a graph, which run next to them; other graphs; unit tests. Of each kind the long modules come first.
+    Rates; commands without a graph, which run next to them; other graphs and nodes; unit tests. Of each kind the long modules come
+    first.
     """
 
     def rank(item: pytest.Item) -> tuple[int, int]:
-        kind = {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2}[_mark(item)]
+        kind = {"rates": 0, "": 1 if item.path.parent == _COMMANDS else 3, "graph": 2, "nodes": 2}[_mark(item)]
         return kind, FIRST.index(item.path.stem) if item.path.stem in FIRST else len(FIRST)
 
     items.sort(key=rank)
@@ -183,7 +187,7 @@ _held: list[int] = []  # descriptor of the lock while a group runs that needs it
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: pytest.Item, nextitem: pytest.Item | None):
     """Wait until the graphs of the other processes allow this one, from a group's first test to the end of its fixtures."""
-    if not _held and _mark(item) and _LOCK in os.environ:
+    if not _held and _mark(item) in _SHARING and _LOCK in os.environ:
         _held.append(os.open(os.environ[_LOCK], os.O_RDONLY | os.O_CLOEXEC))
         fcntl.flock(_held[0], _SHARING[_mark(item)])
     try:

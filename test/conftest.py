@@ -36,7 +36,7 @@ class Answer:
 @pytest.fixture
 def apart(request):
     """Return options of subprocess: a lower priority for the commands of tests that start no graph, which can run next to one."""
-    if any(request.node.get_closest_marker(name) for name in ("graph", "rates")):
+    if any(request.node.get_closest_marker(name) for name in ("graph", "rates", "nodes")):
         return {}
     return {"start_new_session": True, "preexec_fn": _give_way}
 
@@ -155,7 +155,7 @@ def made(folder):
 
     @functools.cache
     def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
-        for _ in range(1 if low else 2):
+        for _ in range(2):
             done = subprocess.run(
                 [*words, "--brief"],
                 cwd=folder,

@@ -7,8 +7,7 @@ pytest.importorskip("rclpy", reason="it looks for a running graph: ./gravcomp te
 from gravcomp.graph.nodes import NODES
 from gravcomp.launcher.domain import reserve_domain
 
-# Not next to a graph with few processors: the probe listens for a limited time.
-pytestmark = pytest.mark.graph
+pytestmark = pytest.mark.nodes
 
 
 def test_the_doctor_reports_that_nothing_runs(gravcomp):

@@ -89,6 +89,7 @@ def own_domain(monkeypatch):
     monkeypatch.setenv("ROS_DOMAIN_ID", APART)
 
 
+@pytest.mark.nodes
 @pytest.mark.parametrize(
     "line",
     [

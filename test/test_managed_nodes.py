@@ -16,7 +16,7 @@ from std_srvs.srv import SetBool, Trigger
 from gravcomp.launcher import NodeProcess, NodeSpec
 from gravcomp_msgs.msg import ControllerStatus, ImuStatus
 
-pytestmark = [pytest.mark.graph, pytest.mark.timeout(300)]
+pytestmark = [pytest.mark.nodes, pytest.mark.timeout(300)]
 
 
 class Observer(Ros2):

@@ -18,7 +18,7 @@ rclpy = pytest.importorskip(
 PATIENCE = 240.0
 
 pytestmark = [
-    pytest.mark.graph,
+    pytest.mark.nodes,
     pytest.mark.skipif(find_chromium() is None, reason="no Chromium on this machine: apt-get install chromium"),
     pytest.mark.timeout(900),
 ]
