@@ -170,7 +170,7 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put what takes longest first, so that no process is idle at the end; otherwise keep the order of pytest-randomly.
 
-    Rates; commands without a graph, which run next to them; other graphs and nodes; unit tests. Long modules of a kind come first.
+    Rates; commands without a graph, which run next to them; other graphs, and nodes; unit tests. Long modules come first.
     """
 
     def rank(item: pytest.Item) -> tuple[int, int]:
