@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from documents import documented
-from shell import mirror
+from shell import mirror, unless_stopped
 
 from gravcomp.environment.give_way import give_way
 
@@ -55,6 +55,16 @@ def gravcomp(apart):
             **apart,
         )
         return Answer(done.returncode, done.stdout, done.stderr)
+
+    return call
+
+
+@pytest.fixture
+def measured(gravcomp):
+    """Run `./gravcomp ...`, which measures a graph, to its end; once more where a busy machine has stopped the graph."""
+
+    def call(*arguments: str, timeout: float = 240.0, **environment: str) -> Answer:
+        return unless_stopped(lambda: gravcomp(*arguments, timeout=timeout, **environment), lambda answer: answer.code)
 
     return call
 
@@ -155,8 +165,8 @@ def made(folder):
 
     @functools.cache
     def run(words: tuple[str, ...], low: bool) -> tuple[int, str]:
-        for _ in range(2):
-            done = subprocess.run(
+        def once() -> subprocess.CompletedProcess:
+            return subprocess.run(
                 [*words, "--brief"],
                 cwd=folder,
                 capture_output=True,
@@ -165,9 +175,8 @@ def made(folder):
                 start_new_session=True,
                 preexec_fn=_give_way if low else None,
             )
-            if done.returncode != 2:
-                break
-            # A graph that a busy machine has stopped cannot be measured, which is code 2; a defect gives it twice.
+
+        done = unless_stopped(once, lambda done: done.returncode)
         return done.returncode, done.stderr + done.stdout
 
     def made(line: str, low: bool) -> tuple[int, str]:

@@ -6,16 +6,10 @@ from documents import documented
 QUICK = ("--travel", "2")  # errors are measured at rest, after the motion
 
 
-def tour(gravcomp, *words):
-    """Return the answer. A graph that a busy machine has stopped cannot be measured, which is code 2; a defect gives it twice."""
-    answer = gravcomp(*words, timeout=600)
-    return gravcomp(*words, timeout=600) if answer.code == 2 else answer
-
-
 @pytest.mark.graph
 @pytest.mark.timeout(1300)
-def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcomp):
-    answer = tour(gravcomp, *documented("./gravcomp arm --viewer")[1:], "--hold", "1.5", *QUICK, "--json")
+def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(measured):
+    answer = measured(*documented("./gravcomp arm --viewer")[1:], "--hold", "1.5", *QUICK, "--json", timeout=600)
     assert answer.code == 0, answer.err
     figures = answer.json
     assert figures["inclination_deg"] == [135.0, 90.0, 45.0, 0.0, -45.0]
@@ -27,9 +21,10 @@ def test_on_an_arm_the_tip_error_is_five_times_smaller_with_compensation(gravcom
 
 @pytest.mark.graph
 @pytest.mark.timeout(1300)
-def test_gravity_from_the_arm_only_works_as_well(gravcomp):
+def test_gravity_from_the_arm_only_works_as_well(measured):
     # No filter has to follow the motion: it may be twice as fast.
-    answer = tour(gravcomp, *documented("./gravcomp arm --gravity arm --hold 3 --json")[1:], "--hold", "1.5", "--travel", "1")
+    line = documented("./gravcomp arm --gravity arm --hold 3 --json")[1:]
+    answer = measured(*line, "--hold", "1.5", "--travel", "1", timeout=600)
     assert answer.code == 0, answer.err
     assert answer.json["ratio"] >= 5.0
 

@@ -63,10 +63,10 @@ def check_compensation(figures: dict) -> None:
 
 
 @pytest.mark.rates
-def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
+def test_the_robot_sags_and_is_compensated_while_it_is_tilted(measured):
     mark = f"GRAVCOMP_TEST={os.getpid()}-scenario"
     line = documented("./gravcomp demo --headless --duration 30 --json")[1:]
-    answer = gravcomp(*line, "--duration", "12", GRAVCOMP_TEST=mark.split("=")[1])
+    answer = measured(*line, "--duration", "12", GRAVCOMP_TEST=mark.split("=")[1])
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
     # The virtual robot and the model sag, straighten and turn alike.
@@ -82,18 +82,18 @@ def test_the_robot_sags_and_is_compensated_while_it_is_tilted(gravcomp):
 
 
 @pytest.mark.graph
-def test_a_tracker_of_the_tip_corrects_the_model_where_the_firmware_is_the_board(gravcomp):
+def test_a_tracker_of_the_tip_corrects_the_model_where_the_firmware_is_the_board(measured):
     board = documented("./gravcomp demo --board emulated")[2:]
-    answer = gravcomp(*documented("./gravcomp demo --tracker 5")[1:], *board, "--headless", "--duration", "10", "--json")
+    answer = measured(*documented("./gravcomp demo --tracker 5")[1:], *board, "--headless", "--duration", "10", "--json")
     assert answer.code == 0, answer.err
     assert answer.json["residual_lateral_mm"] < answer.json["sag_mm"] / 5.0
 
 
 @pytest.mark.rates
-def test_a_recorded_imu_stream_drives_the_loop(gravcomp, broad):
+def test_a_recorded_imu_stream_drives_the_loop(measured, broad):
     trial = sorted(broad.glob("02_*.npz")) or sorted(broad.glob("*.npz"))
     line = documented("./gravcomp demo --imu FILE", FILE=trial[0])[1:]
-    answer = gravcomp(*line, "--headless", "--duration", "12", "--json")
+    answer = measured(*line, "--headless", "--duration", "12", "--json")
     assert answer.code == 0, answer.err
     check_compensation(answer.json)
     assert answer.json["source"] == trial[0].name
