@@ -125,7 +125,7 @@ class ArcRobot:
 
 
 def _weight_energy(q: np.ndarray) -> np.ndarray:
-    """Potential energy (..., 3) of the weight per unit of gravity along x, y and z: of pieces between the points of `centre_line`.
+    """Potential energy (..., 3) of the weight per unit of gravity along x, y and z, of pieces between points of `centre_line`.
 
     The sum of the points follows without the points: a piece counts once for each point from its end on.
     """

@@ -114,7 +114,7 @@ def check(result: dict, setup: Setup) -> None:
 
 
 def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured, setup):
-    """In a coarser mesh, in which the tip sags by 0.5 % more: the motion takes a third of the time."""
+    """In a coarser mesh, in which the tip sags by 0.5 % more: the fit takes half of the time."""
     write_csv(measured, here / "tips.csv", load_robot_file("article").robot.cable_names)
     Path("coarse.yaml").write_text("base: article\nrobot:\n  elements: {around: 4, along: 8}\n", encoding="utf-8")
     result = calibrate(capsys, "tips.csv", "--robot", "coarse.yaml")
