@@ -11,7 +11,6 @@ storage here, above all for several right-hand sides.
 """
 
 import dataclasses
-import functools
 import itertools
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -47,12 +46,12 @@ class BlockPattern:
         """Number of unknowns."""
         return int(self.size.sum())
 
-    @functools.cached_property
+    @property
     def start(self) -> np.ndarray:
         """(l + 1,) first unknown of every level."""
         return np.concatenate([[0], np.cumsum(self.size)])
 
-    @functools.cached_property
+    @property
     def offsets(self) -> tuple[np.ndarray, np.ndarray, int]:
         """Positions of the first entry of every D_i (l,) and of every B_i (l - 1,), and the number of entries."""
         coupling = np.append(self.size[1:] * self.seen, 0)
@@ -71,7 +70,7 @@ class BlockPattern:
             raise ValueError("an entry lies outside the block pattern")
         return position
 
-    @functools.cached_property
+    @property
     def layout(self) -> "Layout":
         """The pattern for compiled functions, see `entry_position`."""
         diagonal, coupling, _ = self.offsets
