@@ -6,7 +6,6 @@ has the path displacement delta_i = sum over its segments of L_j (r (cos phi_i k
 """
 
 import functools
-from collections.abc import Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -25,7 +24,6 @@ NAMES = ("s1c1", "s1c2", "s1c3", "s2c1", "s2c2", "s2c3")
 ANGLES = np.radians([0, 120, 240, 60, 180, 300])
 STATIONS = np.linspace(0.0, 1.0, 9)
 _POINTS_A_SEGMENT = 16
-_COUNTED = np.arange(_POINTS_A_SEGMENT, 0.0, -1.0)
 _HALVES = 0.5 * np.arange(1, 2 * _POINTS_A_SEGMENT + 1)  # middles and ends of its pieces
 
 LIMITS = Limits(tension_max=5.0, displacement_min=-0.02, displacement_max=0.02, tension_rate=1e3, displacement_rate=0.05)
@@ -49,38 +47,28 @@ def cable_jacobian() -> np.ndarray:
     return jacobian
 
 
-def _arcs(q: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
-    """Yield of each segment: position (..., 1, 3) of its begin, `aside` and `ahead` (..., 1, 3), and on them sine and cosine.
+def centre_line(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (..., 33, 3), base to tip, and directions there (..., 33, 3), for coordinates (..., 6), by the midpoint rule.
 
-    A segment lies in a plane: its directions are sums of two, `ahead` at its begin and `aside`, toward which it bends. Sine and
-    cosine (..., 32) are those of its turn at middles and ends of its pieces; the last one is the length (..., 1) of a piece.
+    A segment lies in a plane: its directions are sums of two, `ahead` at its begin and `aside`, toward which it bends.
     """
+    q = np.asarray(q)
     position, frame = np.zeros((*q.shape[:-1], 1, 3)), np.broadcast_to(np.eye(3), (*q.shape[:-1], 3, 3))
+    positions, directions = [position], [frame[..., None, :, 2]]
     h = SEGMENT / _POINTS_A_SEGMENT
-    for segment in (q[..., :3], q[..., 3:]):
+    for segment in np.split(q, 2, axis=-1):
         curvature = np.maximum(np.hypot(segment[..., 0], segment[..., 1]), 1e-12)[..., None]
         toward = segment[..., :2] / curvature
         aside, ahead = (frame[..., :2] @ toward[..., None])[..., None, :, 0], frame[..., None, :, 2]
-        turn = curvature * h * _HALVES
-        sine, cosine = np.sin(turn), np.cos(turn)
-        step = h * (1.0 + segment[..., 2, None])
-        yield position, aside, ahead, sine, cosine, step
-        gone = [(step * part[..., ::2].sum(axis=-1, keepdims=True))[..., None] for part in (sine, cosine)]
-        position = position + gone[0] * aside + gone[1] * ahead
-        # The frame turns in the plane of `aside` and `ahead`; what is across it stays.
-        end = sine[..., -1:] * aside[..., 0, :] + cosine[..., -1:] * ahead[..., 0, :]
-        change = (cosine[..., -1:] - 1.0) * aside[..., 0, :] - sine[..., -1:] * ahead[..., 0, :]
-        frame = np.concatenate([frame[..., :2] + change[..., None] * toward[..., None, :], end[..., None]], axis=-1)
-
-
-def centre_line(q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (..., 33, 3), base to tip, and directions there (..., 33, 3), for coordinates (..., 6), by the midpoint rule."""
-    q = np.asarray(q)
-    positions, directions = [np.zeros((*q.shape[:-1], 1, 3))], [np.broadcast_to(np.eye(3)[2], (*q.shape[:-1], 1, 3))]
-    for position, aside, ahead, sine, cosine, step in _arcs(q):
-        gone = [(step * np.cumsum(part[..., ::2], axis=-1))[..., None] for part in (sine, cosine)]
+        sine, cosine = np.sin(curvature * h * _HALVES)[..., None], np.cos(curvature * h * _HALVES)[..., None]
+        step = h * (1.0 + segment[..., 2, None, None])
+        gone = [step * np.cumsum(part[..., ::2, :], axis=-2) for part in (sine, cosine)]
         positions.append(position + gone[0] * aside + gone[1] * ahead)
-        directions.append(sine[..., 1::2, None] * aside + cosine[..., 1::2, None] * ahead)
+        directions.append(sine[..., 1::2, :] * aside + cosine[..., 1::2, :] * ahead)
+        position, end = positions[-1][..., -1:, :], directions[-1][..., -1, :]
+        # The frame turns in the plane of `aside` and `ahead`; what is across it stays.
+        change = (cosine[..., -1, :] - 1.0) * aside[..., 0, :] - sine[..., -1, :] * ahead[..., 0, :]
+        frame = np.concatenate([frame[..., :2] + change[..., None] * toward[..., None, :], end[..., None]], axis=-1)
     return np.concatenate(positions, axis=-2), np.concatenate(directions, axis=-2)
 
 
@@ -125,18 +113,10 @@ class ArcRobot:
 
 
 def _weight_energy(q: np.ndarray) -> np.ndarray:
-    """Potential energy (..., 3) of the weight per unit of gravity along x, y and z, of pieces between points of `centre_line`.
-
-    The sum of the points follows without the points: a piece counts once for each point from its end on.
-    """
-    total = np.zeros((*q.shape[:-1], 3))
-    for position, aside, ahead, sine, cosine, step in _arcs(q):
-        along = [step * (part[..., ::2] @ _COUNTED)[..., None] for part in (sine, cosine)]
-        total += _POINTS_A_SEGMENT * position[..., 0, :] + along[0] * aside[..., 0, :] + along[1] * ahead[..., 0, :]
-    # Of the two ends only half counts; the base is the origin.
-    ends = [step * part[..., ::2].sum(axis=-1, keepdims=True) for part in (sine, cosine)]
-    total -= 0.5 * (position[..., 0, :] + ends[0] * aside[..., 0, :] + ends[1] * ahead[..., 0, :])
-    return -LINE_DENSITY * LENGTH / (2 * _POINTS_A_SEGMENT) * total
+    """Potential energy (..., 3) of the weight per unit of gravity along x, y and z."""
+    positions, _ = centre_line(q)
+    centres = 0.5 * (positions[..., 1:, :] + positions[..., :-1, :])
+    return -LINE_DENSITY * LENGTH / centres.shape[-2] * centres.sum(axis=-2)
 
 
 def _derivatives(q: np.ndarray, gravity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
