@@ -1,11 +1,13 @@
 """Test bench for gravcomp.motors: a bridge and six geared motors on springs, connected by CAN frames."""
 
+import copy
 import math
 import random
 
 from gravcomp.canbus import codec
 from gravcomp.description.hardware import COUNTS_PER_TURN, Drive, Hardware, Motor
 from gravcomp.motors.bridge import Bridge
+from gravcomp.motors.state import State
 
 HARDWARE = Hardware(motors=tuple(Motor(f"c{i}", i, direction=1 if i % 2 else -1) for i in range(1, 7)))
 STEP = 5e-4  # s
@@ -103,3 +105,19 @@ class Bench:
     def since(self, begin: float, state) -> float:
         """Return the time (s) from `begin` until the bridge was first in this state."""
         return next(t for t, s in self.states if t >= begin and s is state) - begin
+
+
+_FOLLOWING: dict[tuple, tuple[Bench, tuple]] = {}  # benches as they are left in the cache, each with the state of `random`
+
+
+def bench_that_follows(goal: list[float], hardware: Hardware = HARDWARE) -> Bench:
+    """Return a bench that has been started and has followed `goal` for 1.2 s: a copy of one that is computed once."""
+    key = (tuple(goal), repr(hardware))
+    if key not in _FOLLOWING:
+        bench = Bench(hardware).start()
+        bench.run(1.2, lambda t: goal)
+        assert bench.bridge.state is State.ACTIVE
+        _FOLLOWING[key] = bench, random.getstate()
+    bench, state = _FOLLOWING[key]
+    random.setstate(state)
+    return copy.deepcopy(bench, {id(bench.hardware): bench.hardware})

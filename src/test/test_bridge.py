@@ -6,19 +6,17 @@ import random
 
 import can
 import pytest
-from motor_bench import HARDWARE, STEP, Bench
+from motor_bench import HARDWARE, STEP, Bench, bench_that_follows
 
 from gravcomp.canbus import codec
+from gravcomp.description.hardware import Hardware
 from gravcomp.motors.state import DRIVING, State
 
 GOAL = [0.001, -0.002, 0.003, -0.004, 0.0015, 0.0]
 
 
-def following(**options) -> Bench:
-    bench = Bench(**options).start()
-    bench.run(1.2, lambda t: GOAL)
-    assert bench.bridge.state is State.ACTIVE
-    return bench
+def following(hardware: Hardware = HARDWARE) -> Bench:
+    return bench_that_follows(GOAL, hardware)
 
 
 def test_displacement_is_within_20_um_in_steady_state():

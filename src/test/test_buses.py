@@ -5,7 +5,7 @@ import time
 
 import can
 import pytest
-from motor_bench import Bench
+from motor_bench import Bench, bench_that_follows
 
 from gravcomp.canbus import codec
 from gravcomp.canbus.bus import BusError
@@ -27,10 +27,7 @@ GOAL = [1e-3 * (-1) ** i for i in range(9)]
 
 
 def following() -> Bench:
-    bench = Bench(HARDWARE).start()
-    bench.run(1.2, lambda t: GOAL)
-    assert bench.bridge.state is State.ACTIVE
-    return bench
+    return bench_that_follows(GOAL, HARDWARE)
 
 
 def section(**changes):

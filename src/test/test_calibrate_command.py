@@ -109,13 +109,15 @@ def check(result: dict, setup: Setup) -> None:
     written = [segment.material.youngs_modulus for segment in mine.robot.segments]
     assert written == pytest.approx([modulus["value"] * 1e6 for modulus in moduli], rel=1e-4)
     text = Path("mine.yaml").read_text(encoding="utf-8")
-    assert "# Calibrated on" in text and "base: article" in text and "values_at_95_percent" in text
+    assert "# Calibrated on" in text and "base: coarse.yaml" in text and "values_at_95_percent" in text
     assert mine.robot.segments[1].material.damping_time == pytest.approx(damping * 1e-3, rel=1e-3)
 
 
 def test_a_csv_file_becomes_a_calibrated_robot(here, capsys, measured, setup):
+    """In a coarser mesh, in which the tip sags by 0.5 % more: the fit takes half of the time."""
     write_csv(measured, here / "tips.csv", load_robot_file("article").robot.cable_names)
-    result = calibrate(capsys, "tips.csv")
+    Path("coarse.yaml").write_text("base: article\nrobot:\n  elements: {around: 4, along: 8}\n", encoding="utf-8")
+    result = calibrate(capsys, "tips.csv", "--robot", "coarse.yaml")
     check(result, setup)
     motors = load_robot_file("mine.yaml").hardware.motors
     offsets = {f"offset of {m.cable}": 1e3 * m.offset for m in motors}
@@ -142,6 +144,7 @@ def test_a_bag_becomes_a_calibrated_robot(here, capsys, first_cable):
     write_bag(here / "bag", joined(standing(first_cable)))
     found = {p["name"]: p["value"] for p in calibrate(capsys, "bag")["data"]["parameters"]}
     assert found["Young's modulus of proximal"] == pytest.approx(MODULUS * 1e-6, rel=0.02)
+    assert "base: article" in Path("mine.yaml").read_text(encoding="utf-8")
     assert load_robot_file("mine.yaml").robot.segments[0].material.youngs_modulus == pytest.approx(MODULUS, rel=0.02)
 
 

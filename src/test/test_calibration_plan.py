@@ -83,9 +83,9 @@ def test_a_plan_that_time_or_limits_forbid_is_refused(robot):
     slow = PlanOptions(budget=10.0, rate=np.radians(1.0))
     with pytest.raises(ConfigError, match=r"robot 'short': no pose of \d+ s fits into 10 s; allow more time \(--time\)"):
         make_plan(robot, PERIOD, options=slow, orientations=orientations)
-    # With one cable: each pull searches in vain for three seconds.
+    # With one cable and few elements: each pull searches in vain for a second and more.
     payload = dataclasses.replace(robot.payload, mass=20.0)
-    heavy = dataclasses.replace(robot, payload=payload, cables=robot.cables[:1])
+    heavy = dataclasses.replace(robot, payload=payload, cables=robot.cables[:1], elements=Elements(around=4, along=2, radial=1))
     with pytest.raises(ConfigError, match=r"robot 'short': .*equilibrium.* no calibration can be planned"):
         make_plan(heavy, PERIOD, orientations=orientations)
 

@@ -71,10 +71,10 @@ def test_a_surface_with_needles_is_filled_with_well_shaped_elements(tmp_path, me
 
 
 def touching() -> tuple[np.ndarray, np.ndarray]:
-    """A bar of 10 x 10 x 50 mm, and a cut of 2 um from its tip to 20 mm below: its walls touch nearly."""
+    """A bar of 10 x 10 x 100 mm, and a cut of 2 um from its tip to 40 mm above its base: its walls touch nearly."""
     filled = np.ones((3, 2, 5), dtype=bool)
     filled[1, 1, 2:] = False
-    return boxes([-5.0, -1e-3, 1e-3, 5.0], [-5.0, 0.0, 5.0], [0.0, 10.0, 20.0, 30.0, 40.0, 50.0], filled)
+    return boxes([-5.0, -1e-3, 1e-3, 5.0], [-5.0, 0.0, 5.0], [0.0, 20.0, 40.0, 60.0, 80.0, 100.0], filled)
 
 
 def united() -> tuple[np.ndarray, np.ndarray]:
@@ -83,7 +83,7 @@ def united() -> tuple[np.ndarray, np.ndarray]:
     filled[:, 2] = False
     filled[:, 2, [1, 3]] = True
     filled[0, 1, [0, 4]] = False
-    return boxes([-5.0, 0.0, 5.0], [-5.0, 5.0, 5.01, 6.0], [0.0, 10.0, 12.0, 20.0, 22.0, 30.0, 32.0, 50.0], filled)
+    return boxes([-5.0, 0.0, 5.0], [-5.0, 5.0, 5.01, 6.0], [0.0, 20.0, 24.0, 40.0, 44.0, 60.0, 64.0, 100.0], filled)
 
 
 @pytest.mark.parametrize("body", [touching, united])

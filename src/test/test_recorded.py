@@ -104,7 +104,7 @@ def test_a_recorded_fall_is_followed_by_the_model(here, capsys):
     The evaluation must find the moment of letting go: 10 ms are 7 mm at the highest speed.
     """
     robot = load_robot_file("article").robot
-    count = 250  # 2.5 s
+    count = 150  # 1.5 s
     straight = Measured(
         source="straight until it is let go",
         trial=np.zeros(count, int),

@@ -21,7 +21,7 @@ from gravcomp.stream_checks import CounterStamps, StreamMonitor, check_recording
 from gravcomp.stream_checks.spikes import spikes as found_spikes
 
 TRIAL = "05_undisturbed_slow_rotation_with_breaks_B"
-LENGTH = 45.0  # s of motion
+LENGTH = 25.0  # s of motion
 
 
 def shortened(recording):
