@@ -9,7 +9,7 @@ import pytest
 from gravcomp.bench.campaign import Campaign
 from gravcomp.bench.fault_cases import CASES, send_signal
 from gravcomp.bench.hostile_frames import send_hostile_frames
-from gravcomp.launcher.virtual_graph import RunningGraph
+from gravcomp.launcher.virtual_graph import START_TIMEOUT, RunningGraph
 from gravcomp.motors.state import State
 
 pytestmark = pytest.mark.rates
@@ -18,8 +18,9 @@ pytestmark = pytest.mark.rates
 @pytest.fixture(scope="module")
 def campaign():
     with RunningGraph({"virtual_robot": {"motion": "tremor", "feedback_rate": 125}}) as graph:
-        graph.wait_for_commands()
         campaign = Campaign(graph, seed=7)
+        # It resumes a bridge that a busy machine has stopped at the start.
+        assert campaign.make_active(START_TIMEOUT)
         yield campaign
         campaign.close()
 

@@ -40,13 +40,25 @@ def found():
     ros2 = Ros2()
     try:
         with RunningGraph({"virtual_robot": {"feedback_rate": 125}}) as graph:
-            graph.wait_for_commands()
+            drive(graph, ros2)
             statuses = ros2.listen(ControllerStatus, f"{graph.namespace}/controller/status", latched=True)
             commands = ros2.listen(CableCommand, f"{graph.namespace}/cable/command")
             recovered = {target: future(recover, graph, ros2, statuses, commands, *target) for target in WITHOUT_EQUILIBRIUM}
             return Found(recovered, future(wait_for_hold, graph, ros2, statuses))
     finally:
         ros2.close()
+
+
+def drive(graph: RunningGraph, ros2: Ros2) -> None:
+    """Wait until commands are followed; resume once a bridge that a busy machine has stopped at the start."""
+    try:
+        graph.wait_for_commands()
+    except TimeoutError:
+        if not graph.latched_fault():
+            raise
+        ros2.run(f"ros2 service call {graph.namespace}/can_bridge/resume std_srvs/srv/Trigger")
+        ros2.until(lambda: not graph.latched_fault(), "the bridge does not resume")
+        graph.wait_for_commands()
 
 
 def recover(graph: RunningGraph, ros2: Ros2, statuses: list, commands: list, angle: float, plane: float) -> None:
