@@ -30,7 +30,7 @@ _RUBBER = "tentacle"
 _RATES, _SEEDS = (10.0, 90.0), 3  # deg/s
 _STEPS = 400
 _SMOOTHED = 15  # steps on either side of one
-_COUNTED = 12  # steps of which the cycles are counted
+_COUNTED, _FEWEST_COUNTED = 12, 3  # steps of which the cycles are counted; at least of a shorter path
 _PER_G, _GRAVITY = 5460.0, 9.80665  # counts of the range of 6 g
 _COUNTS_PER_RAD_S = 32767.0 / np.radians(2000.0)
 
@@ -144,7 +144,7 @@ def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -
     path = _of_a_base(turning_gravity(np.radians(90.0), 0, 200))
     path = path[: len(path) // every]
     samples = [sample_bytes(*_counts(file, path, step), 1, 0) for step in range(1, len(path))]
-    first = len(samples) - _COUNTED
+    first = len(samples) - max(_FEWEST_COUNTED, _COUNTED // every)
     cycles = loop_cycles(build_image(standalone=True), found.blob, samples, first)
     times = np.array([of.milliseconds for of in cycles])
     return {
