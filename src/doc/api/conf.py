@@ -105,9 +105,16 @@ def _escaped(line: str) -> str:
     return "`".join(parts)
 
 
-def skip_aliases(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
-    """Leave out names of types as `dict[int, float]`, which Sphinx takes for classes and fails to describe."""
-    return True if isinstance(obj, GenericAlias) else None
+def skip_members(app: Any, what: str, name: str, obj: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out names of types as `dict[int, float]`, which Sphinx takes for classes and fails to describe.
+
+    And what a module has imported: Sphinx leaves that out after it has put its description together.
+    """
+    if isinstance(obj, GenericAlias):
+        return True
+    own = app.env.current_document.autodoc_module
+    imported = what == "module" and getattr(obj, "__name__", None) == name and getattr(obj, "__module__", own) != own
+    return True if imported else None
 
 
 def unlink_foreign_types(app: Any, doctree: Any) -> None:
@@ -229,6 +236,6 @@ def setup(app: Any) -> None:
     sphinx_docutils._get_settings = settings_of
     objects = NamedObjects()
     PythonDomain.find_obj = lambda domain, *sought: objects.find(domain, *sought)
-    app.connect("autodoc-skip-member", skip_aliases)
+    app.connect("autodoc-skip-member", skip_members)
     app.connect("autodoc-process-docstring", plain_text, priority=400)
     app.connect("doctree-read", unlink_foreign_types)
