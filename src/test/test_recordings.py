@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gravcomp.recordings.imu import Recording, RecordingError, read_recording
+from gravcomp.recordings.imu.broad_folder import around_first_motion
 
 
 def write_npz(path, **changes):
@@ -82,13 +83,21 @@ def test_averaging_keeps_the_truth_at_the_end_of_each_window():
     assert recording.orientation.tolist() == [truth[2].tolist(), truth[5].tolist()]
 
 
-def test_the_beginning_of_a_recording_has_its_first_seconds():
+def test_a_part_of_a_recording_has_the_seconds_from_its_beginning_to_its_end():
     stamp = 5 * 10**9 + np.arange(7) * 10**9
     truth = np.arange(28.0).reshape(7, 4)
-    recording = Recording("x", stamp, np.arange(21.0).reshape(7, 3), np.ones((7, 3)), orientation=truth).beginning(2.0)
-    assert recording.stamp_ns.tolist() == stamp[:3].tolist()
-    assert recording.gyro[-1].tolist() == [6.0, 7.0, 8.0] and recording.accel.shape == (3, 3)
-    assert recording.orientation.tolist() == truth[:3].tolist() and recording.movement is None
+    recording = Recording("x", stamp, np.arange(21.0).reshape(7, 3), np.ones((7, 3)), orientation=truth).between(1.0, 3.0)
+    assert recording.stamp_ns.tolist() == stamp[1:4].tolist()
+    assert recording.gyro[-1].tolist() == [9.0, 10.0, 11.0] and recording.accel.shape == (3, 3)
+    assert recording.orientation.tolist() == truth[1:4].tolist() and recording.movement is None
+
+
+def test_a_part_of_a_trial_has_rest_and_motion():
+    stamp = 5 * 10**9 + np.arange(100) * 10**9
+    trial = Recording("x", stamp, np.ones((100, 3)), np.ones((100, 3)), movement=np.arange(100) >= 40)
+    part = around_first_motion(trial)
+    assert np.count_nonzero(~part.movement) >= 15 and np.count_nonzero(part.movement) > 15 and len(part) < 40
+    assert part.stamp_ns.tolist() == stamp[(stamp >= part.stamp_ns[0]) & (stamp <= part.stamp_ns[-1])].tolist()
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])

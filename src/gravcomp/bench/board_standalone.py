@@ -30,7 +30,7 @@ _RUBBER = "tentacle"
 _RATES, _SEEDS = (10.0, 90.0), 3  # deg/s
 _STEPS = 400
 _SMOOTHED = 15  # steps on either side of one
-_COUNTED = 12  # steps of which the cycles are counted
+_COUNTED, _BRIEFLY_COUNTED = 12, 3  # steps of which the cycles are counted; in a brief run
 _PER_G, _GRAVITY = 5460.0, 9.80665  # counts of the range of 6 g
 _COUNTS_PER_RAD_S = 32767.0 / np.radians(2000.0)
 
@@ -46,7 +46,7 @@ def run(progress: Progress, *, every: int = 1) -> dict:
         "board_basis_error_mm": round(1e3 * found.error, 4),
         **accuracy(progress, file, found, every),
         **memory(progress, found),
-        **step_time(progress, file, found, every),
+        **step_time(progress, file, found, every, _COUNTED if every == 1 else _BRIEFLY_COUNTED),
         **estimator(progress, file, found, every),
         **({"robots": others(progress)} if every == 1 else {}),
     }
@@ -135,16 +135,17 @@ def memory(progress: Progress, found: Fit) -> dict:
     }
 
 
-def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1) -> dict:
+def step_time(progress: Progress, file: RobotFile, found: Fit, every: int = 1, counted: int = _COUNTED) -> dict:
     """Return `board_ms`: estimated time of a whole step at 168 MHz, median and worst, while gravity turns at 90 deg/s.
 
-    every: more than 1: a path that is so many times shorter, and ends before gravity turns at its rate.
+    every: more than 1: a path that is so many times shorter, and ends before gravity turns at its rate; counted: number of its
+    last steps.
     """
     progress("cycles of a step on the emulated processor")
     path = _of_a_base(turning_gravity(np.radians(90.0), 0, 200))
     path = path[: len(path) // every]
     samples = [sample_bytes(*_counts(file, path, step), 1, 0) for step in range(1, len(path))]
-    first = len(samples) - _COUNTED
+    first = len(samples) - counted
     cycles = loop_cycles(build_image(standalone=True), found.blob, samples, first)
     times = np.array([of.milliseconds for of in cycles])
     return {

@@ -76,7 +76,7 @@ KINDS = ("loop", "mesh", "composed")
 """Options with which a benchmark measures something else, which has a table of its own."""
 
 BRIEF: dict[str, dict[str, Any]] = {
-    "engine": {"every": 25},
+    "engine": {"every": 50},
     "robots": {"every": 10},
     "contact": {"every": 39},
     "track": {"seeds": 1, "brief": True},

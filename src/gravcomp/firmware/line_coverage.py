@@ -41,9 +41,10 @@ def measure(tests: list[str], root: Path, names: str = "") -> Coverage:
     compiler = host_compiler()
     with tempfile.TemporaryDirectory(prefix="gravcomp-") as name:
         folder = Path(name)
-        library, corpus = folder / "board.so", folder / "corpus"
-        compile_files(compiler, sources(*PARTS), library, [*_OPTIONS, "-shared"], folder)
-        compile_files(compiler, [*sources(*PARTS), *sources(TESTS)], corpus, [*_OPTIONS], folder)
+        objects, library, corpus = folder / "board.o", folder / "board.so", folder / "corpus"
+        compile_files(compiler, sources(*PARTS), objects, [*_OPTIONS, "-r", "-nostdlib"], folder)
+        compile_files(compiler, [objects], library, [*_OPTIONS, "-shared"], folder)
+        compile_files(compiler, [objects, *sources(TESTS)], corpus, [*_OPTIONS], folder)
         environment = dict(os.environ, **{LIBRARY_VARIABLE: str(library)})
         options = ["-q", "-p", "no:cacheprovider", "-p", "no:randomly", "-n", "0", "-k", names]
         command = [sys.executable, "-m", "pytest", *options, *tests]

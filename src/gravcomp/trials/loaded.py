@@ -14,7 +14,7 @@ from gravcomp.trials.holding import errors_to, lasting
 from gravcomp.virtual.motion import StaticMotion, base_orientation
 
 _SETTLING, _LEARNT, _FINDING, _MEASURED = (4.0, 14.0), (0.5, 1.8), (6.0, 21.0), (1.0, 3.6)  # s at least, first periods
-_BRIEF = 0.25  # of these, but the errors of model and sensors take their time to be learnt
+_BRIEF, _BRIEF_ZERO = 0.125, 1.0  # of these; s, in which the errors of model and sensors are learnt in a brief case
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,6 +50,8 @@ def run_loaded(job: tuple[Setup, LoadedCase]) -> LoadedOutcome:
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
     share = _BRIEF if case.brief else 1.0
     options = LoadEstimationOptions(kind=kind, compensate_force=case.compensated)
+    if case.brief:
+        options = dataclasses.replace(options, zero_time=_BRIEF_ZERO)
     loop = ClosedLoop(setup, StaticMotion(start), tracker=case.tracker, load=options, cells=case.cells)
     target = rest_target(setup.robot, tip_direction_weight=setup.direction_weight)
     loop.hold(target)

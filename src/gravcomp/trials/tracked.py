@@ -19,7 +19,7 @@ STRONG_CREEP = ((0.10, 0.10, 0.15), (0.2, 2.0, 20.0))
 # s, and first periods of the robot; the longer counts. A tracker at 5 Hz needs some seconds for any robot.
 _RELEASED, _SETTLING, _HELD = (3.0, 10.0), (4.0, 14.0), (8.0, 0.0)
 _LAST = (0.5, 1.7)  # of the released phase, which counts
-_BRIEF = 0.25  # of the three
+_BRIEF = 0.125  # of the three
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def run_tracked(job: tuple[Setup, TrackedCase]) -> TrackedOutcome:
     share = _BRIEF if case.brief else 1.0
     start = base_orientation(np.radians(case.inclination), np.radians(case.roll))
     released, settling, held = (share * lasting(setup, *phase) for phase in (_RELEASED, _SETTLING, _HELD))
-    last = lasting(setup, *_LAST)
+    last = min(released, lasting(setup, *_LAST))
     motion: BaseMotion = StaticMotion(start)
     if case.turning:
         motion = RotationMotion(start, np.array([0.0, 1.0, 0.0]), np.radians(case.turning), released + settling)

@@ -3,10 +3,13 @@
 import os
 from pathlib import Path
 
+import numpy as np
+
 from gravcomp.recordings.imu.reading import read_recording
 from gravcomp.recordings.imu.recording import Recording
 
-_BEGINNING = 60.0  # s: rest, and some of the motion
+# s, of a part of a trial: before its first motion, in which the filter settles; from it on, in which all axes turn.
+_REST, _MOTION = 15.0, 20.0
 
 WHERE = (
     "BROAD (D. Laidig et al., Data 2021, 6(7), 72; CC BY 4.0) is at https://github.com/dlaidig/broad."
@@ -24,6 +27,16 @@ def broad_files() -> list[Path]:
 
 
 def broad_trials(every: int = 1) -> dict[str, Recording]:
-    """Return every `every`-th trial by its name; for more than 1 only the first minute of each. Raises RecordingError."""
+    """Return every `every`-th trial by its name; for more than 1 only a part of each around its first motion.
+
+    Raises RecordingError.
+    """
     trials = {file.stem: read_recording(file) for file in broad_files()[::every]}
-    return {name: trial.beginning(_BEGINNING) for name, trial in trials.items()} if every > 1 else trials
+    return {name: around_first_motion(trial) for name, trial in trials.items()} if every > 1 else trials
+
+
+def around_first_motion(trial: Recording) -> Recording:
+    """Return the end of the rest with which a trial begins, and the beginning of its motion."""
+    assert trial.movement is not None  # every trial of BROAD has it
+    first = 1e-9 * float(trial.stamp_ns[np.argmax(trial.movement)] - trial.stamp_ns[0])
+    return trial.between(first - _REST, first + _MOTION)

@@ -73,9 +73,10 @@ class Recording:
         step = np.diff(self.stamp_ns)
         return 1e9 / float(np.median(step[step > 0]))
 
-    def beginning(self, duration: float) -> "Recording":
-        """Return the samples of the first `duration` s; all temperature readings are kept."""
-        rows = self.stamp_ns <= self.stamp_ns[0] + round(1e9 * duration)
+    def between(self, begin: float, end: float) -> "Recording":
+        """Return the samples from `begin` to `end`, in s after the first sample; all temperature readings are kept."""
+        since = self.stamp_ns - self.stamp_ns[0]
+        rows = (since >= round(1e9 * begin)) & (since <= round(1e9 * end))
         arrays = {name: getattr(self, name) for name in ("stamp_ns", "gyro", "accel", "orientation", "movement")}
         return replace(self, **{name: values[rows] for name, values in arrays.items() if values is not None})
 
