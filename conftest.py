@@ -40,9 +40,9 @@ _ONE_GRAPH = (os.cpu_count() or 1) < 4
 FIRST = (
     "test_documented_firmware",
     "test_documented_experiments",
-    "test_bad_input",
-    "test_documented_benchmarks",
     "test_docs",
+    "test_documented_benchmarks",
+    "test_bad_input",
     "test_documents",
     "test_arm_command",
     "test_demo",

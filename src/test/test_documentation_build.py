@@ -48,15 +48,6 @@ def test_the_search_finds_what_docutils_finds_in_its_order(conf, asked):
         assert list(conf.find_all(node, **asked)) == list(conf._FIND(node, **asked))
 
 
-def test_plain_options_are_read_and_others_left_to_docutils(conf, monkeypatch):
-    monkeypatch.setattr(conf, "_OPTIONS", lambda body, known, lines: (0, "left"))
-    known = {"module": str, "depth": int, "flag": lambda value: value}
-    read = lambda *lines: conf.directive_options(None, known, lines)  # noqa: E731
-    assert read(":module: gravcomp.mesh", ":flag:", ":depth: 3") == (1, {"module": "gravcomp.mesh", "flag": None, "depth": 3})
-    for odd in ((":unknown: x",), (":flag:", ":flag:"), (":depth: three",), (":module: a", "   b"), ("text",), (":module: `a`",)):
-        assert read(*odd) == (0, "left")
-
-
 def test_members_of_other_modules_are_left_out(conf):
     app = SimpleNamespace(env=SimpleNamespace(current_document=SimpleNamespace(autodoc_module="own")))
 

@@ -1,24 +1,19 @@
 """Configuration of Sphinx for `./gravcomp docs`, which reads a copy of the repository."""
 
 import builtins
-import copy
 import functools
 import gc
 import logging
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from types import GenericAlias
 from typing import Any
 
-from docutils.frontend import Values
 from docutils.nodes import Node
-from docutils.parsers.rst.states import Body, RSTState
-from docutils.utils import DependencyList
 from sphinx import addnodes
 from sphinx.domains.python import PythonDomain
 from sphinx.pycode.parser import Parser
 from sphinx.search.en import SearchEnglish
-from sphinx.util import docutils as sphinx_docutils
 
 from gravcomp import __version__
 
@@ -149,9 +144,6 @@ class NamedObjects:
 
 
 _FIND = Node.findall
-_OPTIONS, _OPTION = Body.parse_extension_options, re.compile(r":([a-z-]+):(?: +([^`\\\\]*\S))?")
-_INITIAL_TRANSITIONS = RSTState.add_initial_transitions
-_SETTINGS = sphinx_docutils._get_settings
 
 
 def find_all(
@@ -176,53 +168,6 @@ def find_all(
             waiting += node.children[::-1]
 
 
-def directive_options(body: Body, known: dict[str, Callable], lines: Any) -> tuple[int, Any]:
-    """Return what docutils finds in the options of a directive; it parses each of these blocks as a document of its own.
-
-    What is not one plain line for each option is left to docutils.
-    """
-    found: dict[str, Any] = {}
-    for line in lines:
-        option = _OPTION.fullmatch(line)
-        if option is None or option[1] not in known or option[1] in found:
-            return _OPTIONS(body, known, lines)
-        try:
-            found[option[1]] = known[option[1]](option[2])
-        except (ValueError, TypeError):
-            return _OPTIONS(body, known, lines)
-    return 1, found
-
-
-_transitions: dict[type, list[tuple[str, re.Pattern, str]]] = {}
-
-
-def add_transitions(state: RSTState) -> None:
-    """Add the transitions of a new state of the parser, with the patterns that the first state of its class has compiled."""
-    if type(state) not in _transitions:
-        _INITIAL_TRANSITIONS(state)
-        _transitions[type(state)] = [
-            (name, state.transitions[name][0], state.transitions[name][2]) for name in state.transition_order
-        ]
-        return
-    kept = _transitions[type(state)]
-    state.transition_order = [name for name, _, _ in kept]
-    state.transitions = {name: (pattern, getattr(state, name), following) for name, pattern, following in kept}
-
-
-_settings: dict[tuple, tuple[dict[str, Any], Values]] = {}  # the defaults stay, so that their ids do
-
-
-def settings_of(*components: Any, defaults: dict[str, Any], **how: Any) -> Values:
-    """Return new settings of docutils, which makes a parser of its whole command line for those of each page."""
-    kinds = (one if isinstance(one, type) else type(one) for one in components)
-    key = (*kinds, *((name, id(value)) for name, value in defaults.items()), *how.items())
-    if key not in _settings:
-        _settings[key] = defaults, _SETTINGS(*components, defaults=defaults, **how)
-    settings = copy.copy(_settings[key][1])
-    settings.record_dependencies = DependencyList()  # of a page
-    return settings
-
-
 def setup(app: Any) -> None:
     """Register the hooks; the conversion comes before napoleon's."""
     logging.getLogger("sphinx").setLevel(logging.INFO)  # a hundred thousand messages of autodoc for its authors are not made
@@ -231,9 +176,6 @@ def setup(app: Any) -> None:
     # The same few thousand words, eighty thousand times.
     SearchEnglish.stem = functools.cache(SearchEnglish.stem)
     Node.findall = find_all
-    Body.parse_extension_options = directive_options
-    RSTState.add_initial_transitions = add_transitions
-    sphinx_docutils._get_settings = settings_of
     objects = NamedObjects()
     PythonDomain.find_obj = lambda domain, *sought: objects.find(domain, *sought)
     app.connect("autodoc-skip-member", skip_members)
