@@ -25,7 +25,7 @@ from gravcomp.mesh_files.repair_surface import enclosed_volume
 from gravcomp.mesh_files.repair_volume import boundary_triangles, cell_volumes
 from gravcomp.mesh_files.wild_filling import TOLERANCE, by_wildmeshing
 
-_FORMAT = 4  # part of the key; to be raised when the filling changes
+_FORMAT = 5  # part of the key; to be raised when the filling changes
 # Shape of an element: 1 for a regular tetrahedron, 0 for a flat one. The worst one may not be below.
 _SHAPE = 0.05
 # Share of the volume by which elements may miss the body before another mesher is tried.

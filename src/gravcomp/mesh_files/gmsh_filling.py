@@ -27,7 +27,7 @@ def by_gmsh(nodes: np.ndarray, triangles: np.ndarray, element_size: float, name:
         gmsh.model.mesh.classifySurfaces(np.deg2rad(_SHARP), True, True, np.pi)
         gmsh.model.mesh.createGeometry()
         gmsh.option.setNumber("Mesh.MeshSizeMin", element_size / _UNIT / 4.0)
-        return _filled(gmsh, element_size, name)
+        return _filled(gmsh, element_size, name, ("Netgen",))
 
 
 def within_triangles(nodes: np.ndarray, triangles: np.ndarray, element_size: float, name: str) -> tuple[np.ndarray, np.ndarray]:
@@ -36,7 +36,9 @@ def within_triangles(nodes: np.ndarray, triangles: np.ndarray, element_size: flo
     The shape of the surface stays, and the triangles should be well shaped. Raises MeshError if Gmsh is missing or fails.
     """
     with _surface(*with_short_edges(nodes, triangles, LONGEST * element_size), name) as gmsh:
-        return _filled(gmsh, element_size, name)
+        # Netgen alone leaves elements at the triangles worse shaped: of 59 fillings of a notched tentacle the worst 0.14 in the
+        # mean and 0.09 at least; so they are 0.15 and 0.10. A third round changes little.
+        return _filled(gmsh, element_size, name, ("Netgen", "", "Netgen"))
 
 
 @contextlib.contextmanager
@@ -49,13 +51,15 @@ def _surface(nodes: np.ndarray, triangles: np.ndarray, name: str) -> Iterator[An
         yield gmsh
 
 
-def _filled(gmsh: Any, element_size: float, name: str) -> tuple[np.ndarray, np.ndarray]:
+def _filled(gmsh: Any, element_size: float, name: str, optimisers: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Fill the surface; optimisers: names of Gmsh for what improves the elements, in this order (empty: its own)."""
     faces = [face for _, face in gmsh.model.getEntities(2)]
     gmsh.model.geo.addVolume([gmsh.model.geo.addSurfaceLoop(faces)])
     gmsh.model.geo.synchronize()
     gmsh.option.setNumber("Mesh.MeshSizeMax", element_size / _UNIT)
     gmsh.model.mesh.generate(3)
-    gmsh.model.mesh.optimize("Netgen")
+    for optimiser in optimisers:
+        gmsh.model.mesh.optimize(optimiser)
     points, elements = mesh_of(gmsh, TETRAHEDRON, 4)
     if len(elements) == 0:
         raise MeshError(f"{name}: Gmsh made no tetrahedra; is the surface free of intersections?")
