@@ -14,9 +14,9 @@ OWN = ("--fast", "--json", "--quiet", "-h", "--help")
 
 CORE = "src/test"
 FOLDERS = (CORE, "gravcomp_hw/test", "gravcomp_estimation/test", "gravcomp_fem/test", "test")
-_CORES = os.cpu_count() or 1
-_WORKERS = _CORES + 1
-"""Processes that run tests side by side: one more than cores, as a test with a graph waits for events half of its time."""
+_WORKERS = (os.cpu_count() or 1) + 1
+"""Processes that run tests side by side: one more than cores, as a test with a graph waits for events half of its time, and unit
+tests for buses in real time."""
 
 # System packages that only tests need, and their use.
 _BROWSER = {"chromium": "tests of the viewer"}
@@ -59,8 +59,7 @@ def run(args: argparse.Namespace) -> int:
                 # Else the first graph builds it in the background with low priority, and a command that needs it waits for that.
                 prepare_model("article")
         # A module's tests share a process, because they share what takes long to make: a graph, a model, a browser.
-        # Unit tests hardly wait, and each process imports all of them and loads the compiled functions.
-        how += ["-n", str(_CORES if args.fast else _WORKERS), "--dist", "loadgroup", "--no-loadscope-reorder"]
+        how += ["-n", str(_WORKERS), "--dist", "loadgroup", "--no-loadscope-reorder"]
         # pytest-xdist 3.8 waits for ever after it has replaced a process that crashed: it then hands out tests that are done (its
         # issue 1378). Without a replacement the run ends, and names the test that crashed.
         how += ["--max-worker-restart", "0"]
