@@ -69,7 +69,7 @@ class SweptSections:
     def moments(self, s: float) -> SectionMoments:
         """Return area, centroid and second moments of the section at the arc length s (m); in a rounding, of that below it."""
         s = min(s, self.rounding[0]) if self.rounding else s
-        return _moments(self.placed, self._within(s))
+        return boundary_moments(level_cut(self.placed.straight_surface, self._within(s)))
 
     def curves(self, s: float) -> list[MeasuredOutline]:
         """Return the curves at the arc length s (m), from the innermost out, with slots where they have sharp edges.
@@ -145,12 +145,6 @@ def _whole_section(placed: PlacedBody, tip: bool) -> float:
         if abs(here - (2.0 * one - other)) < _WHOLE * one:
             break
     return (1.0 - inside if tip else inside) * placed.length
-
-
-@functools.lru_cache(maxsize=512)
-def _moments(placed: PlacedBody, height: float) -> SectionMoments:
-    """The moments of the section at a height (m). Each mesh of a body asks for them at the same heights."""
-    return boundary_moments(level_cut(placed.straight_surface, height))
 
 
 def _area(placed: PlacedBody, height: float) -> float:
