@@ -97,6 +97,8 @@ def test_a_part_of_a_trial_has_rest_and_motion():
     trial = Recording("x", stamp, np.ones((100, 3)), np.ones((100, 3)), movement=np.arange(100) >= 40)
     part = around_first_motion(trial)
     assert np.count_nonzero(~part.movement) >= 15 and np.count_nonzero(part.movement) > 15 and len(part) < 40
+    unknown = around_first_motion(Recording("x", stamp, np.ones((100, 3)), np.ones((100, 3))))
+    assert len(unknown) == len(part) and unknown.stamp_ns[0] == stamp[0]
     assert part.stamp_ns.tolist() == stamp[(stamp >= part.stamp_ns[0]) & (stamp <= part.stamp_ns[-1])].tolist()
 
 

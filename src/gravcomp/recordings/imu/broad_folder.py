@@ -36,7 +36,10 @@ def broad_trials(every: int = 1) -> dict[str, Recording]:
 
 
 def around_first_motion(trial: Recording) -> Recording:
-    """Return the end of the rest with which a trial begins, and the beginning of its motion."""
-    assert trial.movement is not None  # every trial of BROAD has it
-    first = 1e-9 * float(trial.stamp_ns[np.argmax(trial.movement)] - trial.stamp_ns[0])
+    """Return the end of the rest with which a trial begins, and the beginning of its motion.
+
+    Of a recording that does not say when it moves, as all of BROAD do, it is the beginning.
+    """
+    moving = trial.movement
+    first = _REST if moving is None else 1e-9 * float(trial.stamp_ns[np.argmax(moving)] - trial.stamp_ns[0])
     return trial.between(first - _REST, first + _MOTION)
